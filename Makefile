@@ -1,0 +1,77 @@
+# The front door. Each target installs what it needs; nothing has to be set up before.
+#   make demo      align two real scans, print the pose, draw before and after
+#   make test      all tests, C++ and Python
+#   make help      the rest
+SHELL := /bin/bash
+VENV ?= .venv
+PY := $(VENV)/bin/python
+PRESET ?= release
+CLI := build/$(PRESET)/vnreg
+DEBIAN := cmake ninja-build g++ libeigen3-dev catch2 libcli11-dev nlohmann-json3-dev \
+          libbenchmark-dev python3-dev python3-venv
+SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
+
+.PHONY: help setup debian-packages build python demo test test-cpp test-python check sanitize \
+        bench evaluate train data model clean
+
+help: ## this list
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
+
+debian-packages:
+	@missing=$$(dpkg-query -W -f='$${Package} $${db:Status-Abbrev}\n' $(DEBIAN) 2>&1 \
+	  | awk '/no packages found matching/ {print $$NF} $$2 == "un" {print $$1}'); \
+	if [ -n "$$missing" ]; then \
+	  $(SUDO) apt-get update -q && $(SUDO) apt-get install -y -q --no-install-recommends $$missing; fi
+
+$(VENV)/.installed: requirements/dev.txt requirements/train.txt | debian-packages
+	python3 -m venv $(VENV)
+	$(PY) -m pip install -q -r requirements/dev.txt
+	$(PY) -m pip install -q --no-deps -e train_py
+	touch $@
+
+setup: debian-packages $(VENV)/.installed ## Debian packages and a virtual environment in .venv
+
+build: debian-packages ## the library and the program, at build/release/vnreg
+	cmake --preset $(PRESET) > /dev/null
+	cmake --build --preset $(PRESET)
+
+python: setup ## the Python module `vnreg`, into .venv
+	$(PY) -m pip install -q --no-build-isolation .
+
+demo: python build ## align two real scans, print the pose, draw before and after
+	$(PY) examples/demo/demo.py --check
+
+test: test-cpp test-python ## all tests
+
+test-cpp: build
+	ctest --preset $(PRESET) -j2
+
+test-python: python build
+	$(PY) -m pytest -q tests/python
+
+check: setup ## formatting, lints, types
+	$(PY) -m ruff check train_py python tests/python bench examples
+	$(PY) -m ruff format --check train_py python tests/python bench examples
+	$(PY) -m mypy train_py/vnreg_train
+
+sanitize: debian-packages ## the C++ tests under address and undefined-behaviour sanitizers
+	cmake --preset asan-ubsan > /dev/null
+	cmake --build --preset asan-ubsan
+	ctest --preset asan-ubsan
+
+data: setup ## sample the furniture models into data/furniture
+	$(PY) -m vnreg_train.cli build-data
+
+train: data ## train models/small.vnr's network from the start (hours); resumes
+	$(PY) -m vnreg_train.cli train small --stage coarse
+	$(PY) -m vnreg_train.cli train small --stage fine
+
+evaluate: python data ## recall of the shipped model on the test split, into docs/results.md
+	$(PY) -m vnreg_train.cli evaluate models/small.vnr --report docs/results.md
+
+bench: python build ## milliseconds per pair, kernels and engine beside torch
+	build/$(PRESET)/kernels_bench --benchmark_min_time=0.2
+	$(PY) bench/versus_torch.py
+
+clean:
+	rm -rf build
