@@ -1,0 +1,1 @@
+"""The paper's network: SE(3)-equivariant encoder, coarse register, fine register, decoder."""

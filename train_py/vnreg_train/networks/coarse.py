@@ -1,0 +1,26 @@
+"""Coarse register: closed-form pose from paired points or features (paper, section III-C1)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+
+def procrustes(source: Tensor, target: Tensor, weight: Tensor | None = None) -> tuple[Tensor, Tensor]:
+    """Rigid (R, t) that minimises Σ w |R x + t - y|² over paired rows.
+
+    source, target: (B, n, 3); weight: (B, n), not negative, any sum; or None for equal weights.
+    Returns R (B, 3, 3) with determinant +1 and t (B, 3). Solved in float64; differentiable. The
+    centroids are weighted in the covariance too (the authors' code takes unweighted ones there).
+    """
+    x, y = source.double(), target.double()
+    w = torch.ones_like(x[..., 0]) if weight is None else weight.double()
+    w = (w / w.sum(1, keepdim=True)).unsqueeze(-1)
+    x_mean, y_mean = (w * x).sum(1, keepdim=True), (w * y).sum(1, keepdim=True)
+    covariance = (w * (y - y_mean)).transpose(1, 2) @ (x - x_mean)
+    u, _, vh = torch.linalg.svd(covariance)
+    sign = torch.ones_like(u[:, 0])
+    sign[:, 2] = torch.det(u.detach() @ vh.detach()).sign()
+    rotation = (u * sign.unsqueeze(1)) @ vh
+    translation = y_mean.squeeze(1) - (rotation @ x_mean.transpose(1, 2)).squeeze(2)
+    return rotation.to(source.dtype), translation.to(source.dtype)

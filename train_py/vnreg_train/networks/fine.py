@@ -1,0 +1,162 @@
+"""Fine register in the manner of IDAM (paper, section III-D)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as functional
+from torch import Tensor, nn
+
+from vnreg_train.networks.coarse import procrustes
+from vnreg_train.networks.config import NetworkConfig
+
+MATCH_RADIUS = 0.05  # a true match is closer than this after the true pose
+
+
+class NormedLinear(nn.Module):
+    """Linear without bias, batch norm over all leading dimensions, ReLU (a 1x1 convolution)."""
+
+    def __init__(self, channels_in: int, channels_out: int) -> None:
+        super().__init__()
+        self.linear = nn.Linear(channels_in, channels_out, bias=False)
+        self.bn = nn.BatchNorm1d(channels_out)
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = self.linear(x)
+        return torch.relu(self.bn(y.flatten(0, -2)).view_as(y))
+
+
+def mlp(*channels: int) -> nn.Sequential:
+    """Normed linear layers with ReLU between the widths, a plain linear layer last."""
+    hidden = [NormedLinear(i, o) for i, o in zip(channels[:-2], channels[1:-1], strict=True)]
+    return nn.Sequential(*hidden, nn.Linear(channels[-2], channels[-1]))
+
+
+@dataclass
+class FineStep:
+    """What one iteration computed."""
+
+    similarity: Tensor  # (B, Ks, Kt), clamped to ±20
+    match: Tensor  # (B, Ks) positions among the kept target points
+    weight_logit: Tensor  # (B, Ks)
+    weight: Tensor  # (B, Ks), normalised
+    rotation: Tensor  # (B, 3, 3), cumulative over iterations, on top of the coarse pose
+    translation: Tensor  # (B, 3)
+
+
+class FineRegister(nn.Module):
+    """Hard elimination, then iterations of distance-aware matching and weighted Procrustes."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        d, p = config.descriptor_channels, config.pair_channels
+        self.iterations = config.fine_iterations
+        self.keep_divisor = config.keep_divisor
+        self.significance = mlp(d, *config.significance_channels, 1)
+        self.pair = mlp(2 * d + 4, p, p)
+        self.similarity = mlp(p, p, 1)
+        self.weight = mlp(p, p, 1)
+
+    def pair_features(self, x: Tensor, y: Tensor, features_x: Tensor, features_y: Tensor) -> Tensor:
+        """Kept points (B, K, 3) and descriptors (B, K, D) of both clouds -> (B, Ks, Kt, P)."""
+        difference = x.unsqueeze(2) - y.unsqueeze(1)
+        distance = torch.linalg.vector_norm(difference, dim=-1, keepdim=True)
+        shape = (-1, x.shape[1], y.shape[1], -1)
+        stacked = torch.cat(
+            [
+                features_x.unsqueeze(2).expand(*shape),
+                features_y.unsqueeze(1).expand(*shape),
+                distance,
+                difference / (distance + 1e-8),
+            ],
+            dim=-1,
+        )
+        return self.pair(stacked)
+
+    def step(
+        self, x: Tensor, y: Tensor, features_x: Tensor, features_y: Tensor
+    ) -> tuple[FineStep, Tensor, Tensor]:
+        """One iteration; returns it (with this step's own pose) and the pose as (R, t)."""
+        features = self.pair_features(x, y, features_x, features_y)
+        similarity = self.similarity(features).squeeze(-1).clamp(-20.0, 20.0)
+        weight_logit = self.weight(features.amax(2)).squeeze(-1)
+        match = similarity.argmax(-1)
+        weight = torch.sigmoid(weight_logit)
+        weight = weight * (weight >= weight.median(-1, keepdim=True).values)
+        weight = weight / (weight.sum(-1, keepdim=True) + 1e-8)
+        matched = torch.gather(y, 1, match.unsqueeze(-1).expand(-1, -1, 3))
+        with torch.no_grad():  # poses are not differentiated; losses act on the matching
+            rotation, translation = procrustes(x, matched, weight)
+        step = FineStep(similarity, match, weight_logit, weight, rotation, translation)
+        return step, rotation, translation
+
+    def run(self, x: Tensor, y: Tensor, features_x: Tensor, features_y: Tensor) -> list[FineStep]:
+        """Kept points, the source already moved by the coarse pose; poses accumulate."""
+        steps: list[FineStep] = []
+        for _ in range(self.iterations):
+            step, rotation, translation = self.step(x, y, features_x, features_y)
+            x = x @ rotation.transpose(1, 2) + translation.unsqueeze(1)
+            if steps:
+                step.rotation = rotation @ steps[-1].rotation
+                moved = rotation @ steps[-1].translation.unsqueeze(-1)
+                step.translation = moved.squeeze(-1) + translation
+            steps.append(step)
+        return steps
+
+    def keep(self, descriptors: Tensor) -> tuple[Tensor, Tensor]:
+        """Significances (B, N) and the indices (B, N // keep_divisor) of the largest, descending."""
+        score = self.significance(descriptors).squeeze(-1)
+        order = torch.sort(score, dim=-1, descending=True, stable=True).indices
+        return score, order[:, : score.shape[1] // self.keep_divisor]
+
+
+def gather_points(values: Tensor, index: Tensor) -> Tensor:
+    """Rows `index` (B, K) of values (B, N, ...)."""
+    return torch.gather(values, 1, index.unsqueeze(-1).expand(-1, -1, values.shape[-1]))
+
+
+def training_candidates(
+    source: Tensor, target: Tensor, keep: int, generator: torch.Generator | None = None
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Points that train the matching: half of them with a true match closer than 0.05.
+
+    source (B, N, 3) at the true pose, target (B, M, 3). Returns source indices (B, keep), the target's
+    nearest point of each (B, keep), and whether that is a true match (B, keep, float).
+    """
+    distance, nearest = torch.cdist(source, target).min(2)
+    is_match = (distance < MATCH_RADIUS).float()
+    positive = torch.multinomial(is_match + 1e-5, keep // 2, generator=generator)
+    negative = torch.multinomial(
+        1 + 1e-5 - is_match, keep - keep // 2, generator=generator
+    )
+    index = torch.cat([positive, negative], dim=1)
+    return index, torch.gather(nearest, 1, index), torch.gather(is_match, 1, index)
+
+
+def fine_loss(
+    steps: list[FineStep], source_score: Tensor, target_score: Tensor, is_match: Tensor
+) -> dict[str, Tensor]:
+    """The three losses of IDAM, summed over iterations. Pair (i, i) is the true match of i.
+
+    source_score, target_score: significances of the candidates (B, K); is_match: (B, K).
+    """
+    first = steps[0].similarity.detach()
+    entropy = functional.mse_loss(source_score, negative_entropy(first, -1)) + functional.mse_loss(
+        target_score, negative_entropy(first, -2)
+    )
+    truth = torch.arange(first.shape[1], device=first.device)
+    match = torch.zeros((), device=first.device)
+    weight = torch.zeros((), device=first.device)
+    for step in steps:
+        log_probability = torch.log_softmax(step.similarity, -1).diagonal(dim1=1, dim2=2)
+        match = match - (log_probability * is_match).sum() / is_match.sum().clamp(min=1.0)
+        label = (step.match == truth).float()
+        weight = weight + functional.binary_cross_entropy_with_logits(step.weight_logit, label)
+    return {"entropy": entropy, "match": match, "weight": weight}
+
+
+def negative_entropy(similarity: Tensor, dim: int) -> Tensor:
+    """Σ p log p of the softmax along `dim`."""
+    log_probability = torch.log_softmax(similarity, dim)
+    return (log_probability.exp() * log_probability).sum(dim)
