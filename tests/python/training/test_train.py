@@ -1,0 +1,145 @@
+"""The training loop: resuming, freezing, averaging, one step of the paper's own configuration."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from tiny_run import STEPS, bent_boxes, tiny_config, train_steps, trainer
+
+from vnreg_train.data.shapes import ShapeSet
+from vnreg_train.training.config import load_config
+from vnreg_train.training.train import StageTrainer
+
+
+def parameters(run: StageTrainer) -> torch.Tensor:
+    return torch.cat([p.detach().flatten() for p in run.network.parameters()])
+
+
+@pytest.mark.parametrize("stage", ["coarse", "fine"])
+def test_a_resumed_run_equals_an_unbroken_one_to_the_bit(tmp_path: Path, stage: str) -> None:
+    if stage == "fine":
+        for folder in ("whole", "broken"):
+            coarse = trainer(tmp_path / folder, "coarse")
+            train_steps(coarse, 2)
+            coarse.save()
+    whole = trainer(tmp_path / "whole", stage)
+    figures = train_steps(whole, STEPS)
+    first = trainer(tmp_path / "broken", stage)
+    before = train_steps(first, 5)
+    first.save()
+    second = trainer(tmp_path / "broken", stage)
+    assert second.step == 5
+    assert second.schedule.get_last_lr() == first.schedule.get_last_lr()
+    after = train_steps(second, STEPS - 5)
+    assert figures == before + after
+    assert torch.equal(parameters(whole), parameters(second))
+    for a, b in zip(
+        whole.average.module.state_dict().values(),
+        second.average.module.state_dict().values(),
+        strict=True,
+    ):
+        assert torch.equal(a, b)
+
+
+def test_the_loop_stops_saves_and_goes_on(tmp_path: Path) -> None:
+    run = trainer(tmp_path, "coarse")
+    run.run(max_minutes=0.0, progress=False)
+    assert run.step == 1 and run.checkpoint.exists()
+    again = trainer(tmp_path, "coarse")
+    again.run(progress=False)
+    assert again.step == STEPS
+    assert list((tmp_path / "tensorboard" / "coarse").glob("events*"))
+
+
+def test_the_second_stage_leaves_the_global_module_alone(tmp_path: Path) -> None:
+    coarse = trainer(tmp_path, "coarse")
+    train_steps(coarse, 2)
+    coarse.save()
+    fine = trainer(tmp_path, "fine")
+    frozen = {k: v.clone() for k, v in fine.network.extractor.global_module.state_dict().items()}
+    local = fine.network.extractor.local_module.descriptor.weight.detach().clone()
+    train_steps(fine, 3)
+    for name, value in fine.network.extractor.global_module.state_dict().items():
+        assert torch.equal(value, frozen[name]), name
+    assert not torch.equal(local, fine.network.extractor.local_module.descriptor.weight)
+
+
+def test_the_second_stage_needs_the_first(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="coarse"):
+        trainer(tmp_path, "fine")
+
+
+def test_a_stage_that_does_not_exist_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="middle"):
+        trainer(tmp_path, "middle")
+
+
+def test_a_gradient_that_is_not_finite_changes_nothing(tmp_path: Path) -> None:
+    run = trainer(tmp_path, "coarse")
+    batch = run.batches[0]
+    assert batch.queries is not None
+    batch.queries[0, 0, 0] = math.nan
+    before = parameters(run)
+    run.train_step(batch)
+    assert run.skipped == 1
+    assert torch.equal(before, parameters(run))
+
+
+def test_training_reduces_the_loss(tmp_path: Path) -> None:
+    config = tiny_config()
+    config = replace(config, coarse=replace(config.coarse, steps=150, learning_rate=5e-3))
+    run = trainer(tmp_path, "coarse", config)
+    figures = train_steps(run, 150)
+    first, last = (sum(f["loss"] for f in part) for part in (figures[:30], figures[-30:]))
+    assert last < 0.9 * first
+
+
+@pytest.mark.parametrize("stage", ["coarse", "fine"])
+def test_one_step_of_the_papers_configuration(tmp_path: Path, stage: str) -> None:
+    """Full widths, 1,024 points, 2,048 queries; only the batch is cut, to fit a test."""
+    shapes = wide_boxes()
+    config = load_config("paper")
+    small_batch = replace(config.coarse, batch=2)
+    config = replace(config, coarse=small_batch, fine=small_batch, compile=False, threads=1)
+    coarse = StageTrainer(config, "coarse", shapes, tmp_path)
+    if stage == "fine":
+        coarse.save()
+    run = coarse if stage == "coarse" else StageTrainer(config, stage, shapes, tmp_path)
+    before = parameters(run)
+    figures = run.train_step(run.batches[0])
+    assert math.isfinite(figures["loss"]) and run.skipped == 0
+    assert not torch.equal(before, parameters(run))
+    assert run.step == 1
+
+
+def wide_boxes() -> ShapeSet:
+    boxes = bent_boxes(2, points=2048)
+    assert boxes.queries is not None and boxes.occupancies is not None
+    return replace(
+        boxes,
+        queries=boxes.queries.repeat(32, axis=1),
+        occupancies=boxes.occupancies.repeat(32, axis=1),
+    )
+
+
+@pytest.mark.parametrize("switch", ["vector_neurons", "invariant_layer", "shared_encoder"])
+def test_every_ablation_trains(tmp_path: Path, switch: str) -> None:
+    config = tiny_config()
+    config = replace(
+        config,
+        network=replace(config.network, **{switch: False}),
+        coarse=replace(config.coarse, scaled_start=False),
+    )
+    coarse = trainer(tmp_path, "coarse", config)
+    assert all(math.isfinite(f["loss"]) for f in train_steps(coarse, 2))
+    coarse.save()
+    fine = trainer(tmp_path, "fine", config)
+    assert all(math.isfinite(f["loss"]) for f in train_steps(fine, 2))

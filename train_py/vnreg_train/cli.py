@@ -1,0 +1,100 @@
+"""`vnreg-train`: build the data, train both stages, export, evaluate."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from vnreg_train.training.config import StageConfig, TrainingConfig, load_config
+
+
+def build_data(arguments: argparse.Namespace) -> None:
+    from vnreg_train.data.build import build_furniture
+
+    build_furniture(
+        Path(arguments.out),
+        Path(arguments.cache),
+        splits=tuple(arguments.splits),
+        occupancy=not arguments.no_occupancy,
+        jobs=arguments.jobs,
+    )
+
+
+def _with_steps(config: TrainingConfig, stage: str, steps: int | None) -> TrainingConfig:
+    from dataclasses import replace
+
+    if steps is None:
+        return config
+    settings: StageConfig = getattr(config, stage)
+    return replace(config, **{stage: replace(settings, steps=steps)})
+
+
+def train(arguments: argparse.Namespace) -> None:
+    from dataclasses import replace
+
+    from vnreg_train.data.shapes import load_shapes
+    from vnreg_train.training.train import StageTrainer
+
+    config = _with_steps(load_config(arguments.config), arguments.stage, arguments.steps)
+    if arguments.threads:
+        config = replace(config, threads=arguments.threads)
+    shapes = load_shapes(Path(arguments.data or config.data.folder), "train")
+    run = Path(arguments.run or Path("runs") / config.name)
+    trainer = StageTrainer(config, arguments.stage, shapes, run)
+    trainer.run(max_minutes=arguments.minutes, progress=not arguments.quiet)
+
+
+def export(arguments: argparse.Namespace) -> None:
+    from vnreg_train.export.model import export_model, load_checkpoint
+
+    network, config = load_checkpoint(Path(arguments.checkpoint))
+    extra = dict(pair.split("=", 1) for pair in arguments.provenance)
+    export_model(
+        network,
+        Path(arguments.out),
+        arguments.name or config["name"],
+        points=arguments.points,
+        extra={f"provenance.{key}": value for key, value in extra.items()},
+    )
+
+
+def parser() -> argparse.ArgumentParser:
+    root = argparse.ArgumentParser(prog="vnreg-train", description=__doc__)
+    commands = root.add_subparsers(required=True, metavar="COMMAND")
+
+    data = commands.add_parser("build-data", help="fetch the furniture models and sample them")
+    data.add_argument("--out", default="data/furniture", help="folder of the HDF5 files")
+    data.add_argument("--cache", default="data/furniture/cache", help="where packages are kept")
+    data.add_argument("--splits", nargs="+", default=["train", "validation", "test"])
+    data.add_argument("--no-occupancy", action="store_true", help="skip the decoder's labels")
+    data.add_argument("--jobs", type=int, default=2)
+    data.set_defaults(run_command=build_data)
+
+    fit = commands.add_parser("train", help="train one stage; resumes from its checkpoint")
+    fit.add_argument("config", help="a TOML file, or the name of a shipped one: small, paper")
+    fit.add_argument("--stage", choices=("coarse", "fine"), required=True)
+    fit.add_argument("--run", help="folder of checkpoints and curves (default runs/NAME)")
+    fit.add_argument("--data", help="folder of the shapes (default: as configured)")
+    fit.add_argument("--steps", type=int, help="length of the schedule, instead of the configured")
+    fit.add_argument("--threads", type=int, help="torch threads, instead of the configured")
+    fit.add_argument("--minutes", type=float, default=float("inf"), help="stop after so long")
+    fit.add_argument("--quiet", action="store_true", help="no progress bar")
+    fit.set_defaults(run_command=train)
+
+    out = commands.add_parser("export", help="write a checkpoint's averaged weights as a .vnr file")
+    out.add_argument("checkpoint")
+    out.add_argument("out")
+    out.add_argument("--name", help="the model's name (default: the configuration's)")
+    out.add_argument("--points", type=int, default=1024, help="default subsampling of the engine")
+    out.add_argument("--provenance", nargs="*", default=[], metavar="KEY=TEXT")
+    out.set_defaults(run_command=export)
+    return root
+
+
+def main() -> None:
+    arguments = parser().parse_args()
+    arguments.run_command(arguments)
+
+
+if __name__ == "__main__":
+    main()

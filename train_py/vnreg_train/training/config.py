@@ -1,0 +1,96 @@
+"""A training run's configuration: one TOML file, checked key by key."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from vnreg_train.networks.config import NetworkConfig
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+CONFIG_FOLDER = Path(__file__).resolve().parent.parent / "configs"
+
+
+@dataclass(frozen=True)
+class DataConfig:
+    """What a batch holds."""
+
+    folder: str = "data/furniture"
+    points: int = 1024
+    queries: int = 2048
+    # Neighbours at this density; 0 = the network's. Half the points and half the neighbours cover the
+    # same surface, so a network trained on 512 points with 10 runs on 1,024 with 20.
+    neighbours: int = 0
+    anisotropic: bool = False  # random scale per axis
+    settings: dict[str, float] = field(default_factory=lambda: {"independent": 1.0})
+
+
+@dataclass(frozen=True)
+class StageConfig:
+    """One stage's optimisation: AdamW on a one-cycle schedule with clipped gradients and EMA."""
+
+    steps: int = 300_000
+    batch: int = 32
+    learning_rate: float = 1e-4
+    weight_decay: float = 1e-3
+    warmup: float = 0.05  # share of the steps in which the rate rises
+    clip_norm: float = 1.0
+    ema_decay: float = 0.999
+    bfloat16: bool = False  # autocast of encoder, local module and decoder; poses stay in float64
+    registration_weight: float = 10.0
+    occupancy_weight: float = 0.1  # of the sum over 2,048 queries
+    consistency_weight: float = 0.0  # ours: whitened distance of the paired global features
+    scaled_start: bool = False  # ours: initial weights scaled on data; equivariant networks only
+    gradient_limit: float = 0.0  # ours: largest gradient of one pair's Procrustes; 0 = none
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """The whole file."""
+
+    name: str = "unnamed"
+    seed: int = 0
+    threads: int = 2
+    compile: bool = True
+    checkpoint_minutes: float = 5.0
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    data: DataConfig = field(default_factory=DataConfig)
+    coarse: StageConfig = field(default_factory=StageConfig)
+    fine: StageConfig = field(default_factory=StageConfig)
+
+
+T = TypeVar("T")
+
+
+def _section(kind: type[T], name: str, values: dict[str, Any]) -> T:
+    known = {f.name for f in fields(kind)}  # type: ignore[arg-type]
+    unknown = sorted(set(values) - known)
+    if unknown:
+        raise ValueError(f"[{name}]: unknown keys {unknown}; known: {sorted(known)}")
+    return kind(**values)
+
+
+def parse_config(text: str) -> TrainingConfig:
+    """Reads TOML text; every unknown section or key is an error that names the known ones."""
+    values = tomllib.loads(text)
+    values["network"] = NetworkConfig.from_dict(values.get("network", {}))
+    for name, kind in (("data", DataConfig), ("coarse", StageConfig), ("fine", StageConfig)):
+        values[name] = _section(kind, name, values.get(name, {}))
+    return _section(TrainingConfig, "top level", values)
+
+
+def load_config(path: str | Path) -> TrainingConfig:
+    """Reads a file, or one of the shipped configurations by its bare name (`small`, `paper`)."""
+    path = Path(path)
+    if not path.suffix and not path.exists():
+        path = CONFIG_FOLDER / f"{path}.toml"
+    if not path.exists():
+        shipped = sorted(p.stem for p in CONFIG_FOLDER.glob("*.toml"))
+        raise FileNotFoundError(f"{path}: no such configuration; shipped ones: {shipped}")
+    return parse_config(path.read_text(encoding="utf-8"))
