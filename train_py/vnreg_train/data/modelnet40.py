@@ -1,0 +1,59 @@
+"""ModelNet40 as its OFF meshes (paper, section IV-A); its HDF5 form is read by shapes.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from vnreg_train.data.catalog import stable_seed
+from vnreg_train.data.mesh import (
+    Float32,
+    MeshError,
+    checked_mesh,
+    normalised,
+    sample_surface,
+    welded,
+)
+from vnreg_train.data.off import parse_off
+from vnreg_train.data.shapes import ShapesError, ShapeSet
+
+SURFACE_POINTS = 16_384
+_CATEGORIES = """
+airplane bathtub bed bench bookshelf bottle bowl car chair cone cup curtain desk door dresser
+flower_pot glass_box guitar keyboard lamp laptop mantel monitor night_stand person piano plant
+radio range_hood sink sofa stairs stool table tent toilet tv_stand vase wardrobe xbox
+"""
+CATEGORIES = tuple(_CATEGORIES.split())
+
+
+def load_off_folder(path: Path, split: str, points: int | None = None) -> ShapeSet:
+    """Shapes sampled from path/<category>/<split>/*.off, sorted by category and name.
+
+    Each has `points` (default 16,384) surface points, uniform by area, in the mesh centred at
+    its bounding-box centre with longest side 1; a pure function of the file's name and bytes.
+    There are no occupancy queries: the meshes are not watertight. Raises ShapesError that names
+    the file for a mesh that cannot be sampled.
+    """
+    files = sorted(path.glob(f"*/{split}/*.off"))
+    if not files:
+        raise ShapesError(f"{path}: no <category>/{split}/*.off meshes")
+    found = {file.parent.parent.name for file in files}
+    categories = CATEGORIES if found <= set(CATEGORIES) else tuple(sorted(found))
+    surfaces = [_sampled(file, SURFACE_POINTS if points is None else points) for file in files]
+    return ShapeSet(
+        surface=np.stack(surfaces),
+        label=np.array([categories.index(file.parent.parent.name) for file in files], np.int64),
+        names=tuple(f"{file.parent.parent.name}/{file.stem}" for file in files),
+        categories=categories,
+    )
+
+
+def _sampled(file: Path, points: int) -> Float32:
+    try:
+        mesh = welded(parse_off(file.read_bytes()))
+        mesh = normalised(checked_mesh(mesh.vertices, mesh.triangles))
+    except (OSError, MeshError) as error:
+        raise ShapesError(f"{file}: {error}") from error
+    rng = np.random.default_rng(stable_seed("modelnet40", file.parent.parent.name, file.stem))
+    return sample_surface(mesh, points, rng).astype(np.float32)
