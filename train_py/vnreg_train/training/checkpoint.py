@@ -56,6 +56,9 @@ def restore_training_state(
     average.module.load_state_dict(state["ema"])
     average.n_averaged.copy_(state["ema_updates"])
     optimizer.load_state_dict(state["optimizer"])
-    schedule.load_state_dict(state["schedule"])
+    # Where the schedule stands is the checkpoint's, how long it is the configuration's: the same
+    # configuration goes on to the bit, a shorter or longer one bends the rest of the curve.
+    length = ("total_steps", "_schedule_phases")
+    schedule.load_state_dict({k: v for k, v in state["schedule"].items() if k not in length})
     torch.set_rng_state(state["torch_rng"])
     return int(state["step"])
