@@ -37,6 +37,21 @@ def test_weights_below_the_median_are_zero_and_the_rest_sum_to_one() -> None:
     assert abs(float(step.weight.sum()) - 1) < 1e-6
 
 
+def test_split_algebra_equals_the_concatenation() -> None:
+    """The paper's pair layer takes [F_i; F_j; distance; direction] of every pair."""
+    torch.manual_seed(5)
+    fine = FineRegister(CONFIG).double().eval()
+    x, y, fx, fy = (torch.randn(1, n, c, dtype=torch.float64) for n, c in ((9, 3), (7, 3), (9, 8), (7, 8)))
+    difference = x.unsqueeze(2) - y.unsqueeze(1)
+    distance = difference.norm(dim=-1, keepdim=True)
+    shape = (1, 9, 7, 8)
+    pairs = [fx.unsqueeze(2).expand(shape), fy.unsqueeze(1).expand(shape), distance, difference / distance]
+    features = fine.pair(torch.cat(pairs, dim=-1))
+    similarity, row_maxima = fine.compare(x, y, *fine.feature_parts(fx, fy))
+    assert torch.allclose(similarity, fine.similarity(features).squeeze(-1), atol=1e-9)
+    assert torch.allclose(row_maxima, features.amax(2), atol=1e-9)
+
+
 def test_poses_accumulate() -> None:
     """The last step's pose moves the source to where the iterations left it."""
     torch.manual_seed(2)
@@ -44,9 +59,9 @@ def test_poses_accumulate() -> None:
     x, y, fx, fy = (torch.randn(1, 12, n) for n in (3, 3, 8, 8))
     with torch.no_grad():
         steps = fine.run(x, y, fx, fy)
-        moved = x
+        moved, parts = x, fine.feature_parts(fx, fy)
         for _ in range(3):
-            _, r, t = fine.step(moved, y, fx, fy)
+            _, r, t = fine.step(moved, y, *parts)
             moved = moved @ r.transpose(1, 2) + t.unsqueeze(1)
     last = steps[-1]
     assert torch.allclose(x @ last.rotation.transpose(1, 2) + last.translation, moved, atol=1e-5)

@@ -1,8 +1,8 @@
-"""Reads a `.vnr` model file back into torch: the inverse of `export_model`, as far as the file goes.
+"""Reads a `.vnr` model file back into torch: the inverse of `export_model`, where the file allows.
 
 The file's batch norms are folded, so the network comes back with batch norms that only scale and
-shift; the decoder, which no file holds, keeps its initial weights. Such a network can be evaluated and
-exported (to the same bytes), but training should go on from a checkpoint.
+shift; the decoder, which no file holds, keeps its initial weights. Such a network can be evaluated
+and exported (to the same bytes), but training should go on from a checkpoint.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The pipeline in torch, stage by stage, as docs/design.md names the stages.
 
 This is what the engine is compared with. It favours plainness over speed, and shares no code with the
-engine: neighbours by full sort, concatenations written out, batch norms not folded.
+engine: neighbours by full sort, pooled concatenations written out, batch norms not folded.
 """
 
 from __future__ import annotations

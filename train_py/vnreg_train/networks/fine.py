@@ -22,9 +22,12 @@ class NormedLinear(nn.Module):
         self.linear = nn.Linear(channels_in, channels_out, bias=False)
         self.bn = nn.BatchNorm1d(channels_out)
 
-    def forward(self, x: Tensor) -> Tensor:
-        y = self.linear(x)
+    def normalise(self, y: Tensor) -> Tensor:
+        """The part behind the linear map."""
         return torch.relu(self.bn(y.flatten(0, -2)).view_as(y))
+
+    def forward(self, x: Tensor) -> Tensor:
+        return self.normalise(self.linear(x))
 
 
 def mlp(*channels: int) -> nn.Sequential:
@@ -58,29 +61,43 @@ class FineRegister(nn.Module):
         self.similarity = mlp(p, p, 1)
         self.weight = mlp(p, p, 1)
 
-    def pair_features(self, x: Tensor, y: Tensor, features_x: Tensor, features_y: Tensor) -> Tensor:
-        """Kept points (B, K, 3) and descriptors (B, K, D) of both clouds -> (B, Ks, Kt, P)."""
+    def feature_parts(self, features_x: Tensor, features_y: Tensor) -> tuple[Tensor, Tensor]:
+        """What the first pair layer makes of the descriptors (B, K, D) of either cloud: (B, K, P).
+
+        The layer is linear in [F_i; F_j; distance; direction], so these parts are computed once for
+        all iterations and per point, not per pair.
+        """
+        weight, d = self._first_pair_weight(), features_x.shape[-1]
+        return features_x @ weight[:, :d].T, features_y @ weight[:, d : 2 * d].T
+
+    def _first_pair_weight(self) -> Tensor:
+        first = self.pair[0]
+        assert isinstance(first, NormedLinear)
+        return first.linear.weight
+
+    def compare(self, x: Tensor, y: Tensor, part_x: Tensor, part_y: Tensor) -> tuple[Tensor, Tensor]:
+        """Kept points (B, K, 3) and their feature parts -> similarity (B, Ks, Kt), row maxima (B, Ks, P).
+
+        The row maxima are those of the pair features over the target's points.
+        """
+        first = self.pair[0]
+        assert isinstance(first, NormedLinear)
+        w_distance, w_direction = self._first_pair_weight()[:, -4:].split([1, 3], dim=1)
         difference = x.unsqueeze(2) - y.unsqueeze(1)
         distance = torch.linalg.vector_norm(difference, dim=-1, keepdim=True)
-        shape = (-1, x.shape[1], y.shape[1], -1)
-        stacked = torch.cat(
-            [
-                features_x.unsqueeze(2).expand(*shape),
-                features_y.unsqueeze(1).expand(*shape),
-                distance,
-                difference / (distance + 1e-8),
-            ],
-            dim=-1,
-        )
-        return self.pair(stacked)
+        direction = difference / (distance + 1e-8)
+        hidden = part_x.unsqueeze(2) + part_y.unsqueeze(1)
+        hidden = hidden + distance @ w_distance.T + direction @ w_direction.T
+        features = self.pair[1](first.normalise(hidden))
+        similarity = self.similarity(features).squeeze(-1).clamp(-20.0, 20.0)
+        return similarity, features.amax(2)
 
     def step(
-        self, x: Tensor, y: Tensor, features_x: Tensor, features_y: Tensor
+        self, x: Tensor, y: Tensor, part_x: Tensor, part_y: Tensor
     ) -> tuple[FineStep, Tensor, Tensor]:
         """One iteration; returns it (with this step's own pose) and the pose as (R, t)."""
-        features = self.pair_features(x, y, features_x, features_y)
-        similarity = self.similarity(features).squeeze(-1).clamp(-20.0, 20.0)
-        weight_logit = self.weight(features.amax(2)).squeeze(-1)
+        similarity, row_maxima = self.compare(x, y, part_x, part_y)
+        weight_logit = self.weight(row_maxima).squeeze(-1)
         match = similarity.argmax(-1)
         weight = torch.sigmoid(weight_logit)
         weight = weight * (weight >= weight.median(-1, keepdim=True).values)
@@ -92,10 +109,14 @@ class FineRegister(nn.Module):
         return step, rotation, translation
 
     def run(self, x: Tensor, y: Tensor, features_x: Tensor, features_y: Tensor) -> list[FineStep]:
-        """Kept points, the source already moved by the coarse pose; poses accumulate."""
+        """Kept points (B, K, 3), the source already moved by the coarse pose, and descriptors (B, K, D).
+
+        Poses accumulate over the iterations.
+        """
+        part_x, part_y = self.feature_parts(features_x, features_y)
         steps: list[FineStep] = []
         for _ in range(self.iterations):
-            step, rotation, translation = self.step(x, y, features_x, features_y)
+            step, rotation, translation = self.step(x, y, part_x, part_y)
             x = x @ rotation.transpose(1, 2) + translation.unsqueeze(1)
             if steps:
                 step.rotation = rotation @ steps[-1].rotation

@@ -78,7 +78,17 @@ class FineStage(nn.Module):
 
         self._encode = compile_if(network.encode)
         self._describe = compile_if(network.extractor.describe)
-        network.fine.pair_features = compile_if(network.fine.pair_features)  # type: ignore[method-assign]
+        plain_compare = network.fine.compare
+
+        def compare(*clouds: Tensor) -> tuple[Tensor, Tensor]:
+            with self._autocast():
+                similarity, row_maxima = plain_compare(*clouds)
+            return similarity.float(), row_maxima.float()
+
+        network.fine.compare = compile_if(compare)  # type: ignore[method-assign]
+
+    def _autocast(self) -> torch.autocast:
+        return torch.autocast("cpu", torch.bfloat16, enabled=self.config.bfloat16)
 
     def trainable(self) -> list[nn.Parameter]:
         parts = [self.network.extractor.local_module, self.network.fine]
@@ -91,7 +101,7 @@ class FineStage(nn.Module):
             latent, feature = self._encode(batch.edges)
             g_source, g_target = feature.transpose(1, 2).chunk(2)
             rotation, translation = procrustes(g_source, g_target)
-        with torch.autocast("cpu", torch.bfloat16, enabled=self.config.bfloat16):
+        with self._autocast():
             descriptors = self._describe(batch.edges, latent, feature).float()
         f_source, f_target = descriptors.chunk(2)
         x, y = batch.points.chunk(2)

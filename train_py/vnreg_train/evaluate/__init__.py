@@ -1,0 +1,1 @@
+"""Recall and confidence of a model, measured through the engine: the shipped product's figures."""
