@@ -11,7 +11,7 @@ DEBIAN := cmake ninja-build g++ libeigen3-dev catch2 libcli11-dev nlohmann-json3
           libbenchmark-dev python3-dev python3-venv
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
-.PHONY: help setup debian-packages build python demo test test-cpp test-python check sanitize \
+.PHONY: help test-data setup debian-packages build python demo test test-cpp test-python check sanitize \
         bench evaluate train data model clean
 
 help: ## this list
@@ -46,8 +46,11 @@ test: test-cpp test-python ## all tests
 test-cpp: build
 	ctest --preset $(PRESET) -j2
 
-test-python: python build
+test-python: python build test-data
 	$(PY) -m pytest -q tests/python
+
+test-data: setup ## the test split of the furniture models, surfaces only
+	$(PY) -m vnreg_train.cli build-data --splits test --no-occupancy
 
 check: setup ## formatting, lints, types
 	$(PY) -m ruff check train_py python tests/python bench examples

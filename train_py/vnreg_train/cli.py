@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from vnreg_train.training.config import StageConfig, TrainingConfig, load_config
+from vnreg_train.training.config import TrainingConfig, load_config
 
 
 def build_data(arguments: argparse.Namespace) -> None:
@@ -25,8 +25,9 @@ def _with_steps(config: TrainingConfig, stage: str, steps: int | None) -> Traini
 
     if steps is None:
         return config
-    settings: StageConfig = getattr(config, stage)
-    return replace(config, **{stage: replace(settings, steps=steps)})
+    if stage == "coarse":
+        return replace(config, coarse=replace(config.coarse, steps=steps))
+    return replace(config, fine=replace(config.fine, steps=steps))
 
 
 def train(arguments: argparse.Namespace) -> None:
@@ -56,6 +57,31 @@ def export(arguments: argparse.Namespace) -> None:
         points=arguments.points,
         extra={f"provenance.{key}": value for key, value in extra.items()},
     )
+
+
+def golden(arguments: argparse.Namespace) -> None:
+    from vnreg_train.data.protocol import make_pair
+    from vnreg_train.data.shapes import load_shapes
+    from vnreg_train.export.model import export_golden, load_checkpoint
+
+    network, _ = load_checkpoint(Path(arguments.checkpoint))
+    shapes = load_shapes(Path(arguments.data), "validation")
+    pair = make_pair(shapes, arguments.shape, "independent", 180)
+    # Few points, and not equally many: the file holds every activation.
+    source, target = pair.source[:128].astype("float64"), pair.target[:120].astype("float64")
+    export_golden(network, Path(arguments.model), Path(arguments.out), source, target)
+
+
+def evaluate(arguments: argparse.Namespace) -> None:
+    from vnreg_train.evaluate.commands import evaluate_main
+
+    evaluate_main(arguments)
+
+
+def calibrate(arguments: argparse.Namespace) -> None:
+    from vnreg_train.evaluate.commands import calibrate_main
+
+    calibrate_main(arguments)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -88,6 +114,43 @@ def parser() -> argparse.ArgumentParser:
     out.add_argument("--points", type=int, default=1024, help="default subsampling of the engine")
     out.add_argument("--provenance", nargs="*", default=[], metavar="KEY=TEXT")
     out.set_defaults(run_command=export)
+
+    gold = commands.add_parser("golden", help="write every activation of one pair, for selftest")
+    gold.add_argument("checkpoint")
+    gold.add_argument("model", help="the .vnr file exported from the checkpoint")
+    gold.add_argument("out")
+    gold.add_argument("--data", default="data/furniture")
+    gold.add_argument("--shape", type=int, default=0, help="index in the validation split")
+    gold.set_defaults(run_command=golden)
+
+    def engine_arguments(command: argparse.ArgumentParser, split: str) -> None:
+        command.add_argument("model", help="a .vnr file")
+        command.add_argument("--data", default="data/furniture")
+        command.add_argument("--split", default=split)
+        command.add_argument("--threads", type=int, default=1)
+        command.add_argument("--limit", type=int, help="only the first so many shapes")
+
+    table = commands.add_parser(
+        "evaluate", help="recall per setting and angle range, by the engine"
+    )
+    engine_arguments(table, "test")
+    table.add_argument("--protocol", default="P0", choices=("P0", "text"))
+    table.add_argument(
+        "--settings", nargs="+", default=["clean", "noisy", "independent", "partial"]
+    )
+    table.add_argument("--angles", nargs="+", type=float, default=[45.0, 90.0, 135.0, 180.0])
+    table.add_argument("--mode", default="paper", help="coarse, paper or verified")
+    table.add_argument("--seed", type=int, default=0)
+    table.add_argument("--json", default="build/reports/recall.json")
+    table.add_argument("--report", help="Markdown file whose recall section is rewritten")
+    table.set_defaults(run_command=evaluate)
+
+    fit_confidence = commands.add_parser(
+        "calibrate", help="fit the confidence on the validation split"
+    )
+    engine_arguments(fit_confidence, "validation")
+    fit_confidence.add_argument("--out", help="write the model with its calibration here")
+    fit_confidence.set_defaults(run_command=calibrate)
     return root
 
 

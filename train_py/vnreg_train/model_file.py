@@ -98,7 +98,7 @@ def read_checksum(path: str | os.PathLike[str]) -> int:
     """The head checksum of a valid file, which identifies it; raises like read_model."""
     content = _read_file(Path(path))
     decode_model(content)
-    return struct.unpack_from("<I", content, _HEAD_CHECKSUM_BYTE)[0]  # type: ignore[no-any-return]
+    return struct.unpack_from("<I", content, _HEAD_CHECKSUM_BYTE)[0]
 
 
 def encode_model(metadata: Mapping[str, MetadataValue], tensors: Mapping[str, Tensor]) -> bytes:

@@ -29,11 +29,18 @@ def test_keeps_the_top_sixth_in_descending_order() -> None:
 def test_weights_below_the_median_are_zero_and_the_rest_sum_to_one() -> None:
     torch.manual_seed(1)
     fine = FineRegister(CONFIG).eval()
-    x, y, fx, fy = torch.randn(1, 10, 3), torch.randn(1, 7, 3), torch.randn(1, 10, 8), torch.randn(1, 7, 8)
+    x, y, fx, fy = (
+        torch.randn(1, 10, 3),
+        torch.randn(1, 7, 3),
+        torch.randn(1, 10, 8),
+        torch.randn(1, 7, 8),
+    )
     with torch.no_grad():
         step = fine.run(x, y, fx, fy)[0]
     assert step.similarity.shape == (1, 10, 7)
-    assert int((step.weight > 0).sum()) == 6  # ten weights, lower median: five and the median itself
+    assert (
+        int((step.weight > 0).sum()) == 6
+    )  # ten weights, lower median: five and the median itself
     assert abs(float(step.weight.sum()) - 1) < 1e-6
 
 
@@ -41,11 +48,18 @@ def test_split_algebra_equals_the_concatenation() -> None:
     """The paper's pair layer takes [F_i; F_j; distance; direction] of every pair."""
     torch.manual_seed(5)
     fine = FineRegister(CONFIG).double().eval()
-    x, y, fx, fy = (torch.randn(1, n, c, dtype=torch.float64) for n, c in ((9, 3), (7, 3), (9, 8), (7, 8)))
+    x, y, fx, fy = (
+        torch.randn(1, n, c, dtype=torch.float64) for n, c in ((9, 3), (7, 3), (9, 8), (7, 8))
+    )
     difference = x.unsqueeze(2) - y.unsqueeze(1)
     distance = difference.norm(dim=-1, keepdim=True)
     shape = (1, 9, 7, 8)
-    pairs = [fx.unsqueeze(2).expand(shape), fy.unsqueeze(1).expand(shape), distance, difference / distance]
+    pairs = [
+        fx.unsqueeze(2).expand(shape),
+        fy.unsqueeze(1).expand(shape),
+        distance,
+        difference / distance,
+    ]
     features = fine.pair(torch.cat(pairs, dim=-1))
     similarity, row_maxima = fine.compare(x, y, *fine.feature_parts(fx, fy))
     assert torch.allclose(similarity, fine.similarity(features).squeeze(-1), atol=1e-9)
@@ -74,8 +88,10 @@ def test_half_of_the_candidates_have_a_true_match() -> None:
     index, nearest, is_match = training_candidates(source, target, 40)
     assert index.shape == nearest.shape == is_match.shape == (4, 40)
     assert bool((is_match[:, :20] == 1).all()) and bool((is_match[:, 20:] == 0).all())
-    distance = (torch.gather(source, 1, index.unsqueeze(-1).expand(-1, -1, 3))
-                - torch.gather(target, 1, nearest.unsqueeze(-1).expand(-1, -1, 3))).norm(dim=-1)
+    distance = (
+        torch.gather(source, 1, index.unsqueeze(-1).expand(-1, -1, 3))
+        - torch.gather(target, 1, nearest.unsqueeze(-1).expand(-1, -1, 3))
+    ).norm(dim=-1)
     assert bool((distance[:, :20] < 0.05).all()) and bool((distance[:, 20:] >= 0.05).all())
 
 

@@ -29,7 +29,9 @@ def test_occupancy_loss_does_not_depend_on_the_number_of_queries() -> None:
     once = occupancy_loss(logits, labels)
     twice = occupancy_loss(logits.repeat(1, 2), labels.repeat(1, 2))
     assert torch.isclose(once, twice)
-    assert torch.isclose(occupancy_loss(torch.zeros(1, 8), torch.ones(1, 8)), torch.tensor(2048 * math.log(2)))
+    assert torch.isclose(
+        occupancy_loss(torch.zeros(1, 8), torch.ones(1, 8)), torch.tensor(2048 * math.log(2))
+    )
 
 
 def test_consistency_is_zero_for_equal_features_and_blind_to_scale_and_rotation() -> None:

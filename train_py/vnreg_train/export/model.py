@@ -74,7 +74,7 @@ def export_model(
 
 
 def load_checkpoint(path: Path) -> tuple[RegistrationNetwork, dict[str, Any]]:
-    """The averaged weights of a checkpoint in evaluation mode, and the checkpoint's configuration."""
+    """A checkpoint's averaged weights in evaluation mode, and its configuration."""
     state = torch.load(path, weights_only=True)
     network = RegistrationNetwork(NetworkConfig.from_dict(state["config"]["network"]))
     network.load_state_dict(state["ema"])

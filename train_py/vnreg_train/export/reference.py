@@ -1,10 +1,12 @@
 """The pipeline in torch, stage by stage, as docs/design.md names the stages.
 
-This is what the engine is compared with. It favours plainness over speed, and shares no code with the
-engine: neighbours by full sort, pooled concatenations written out, batch norms not folded.
+This is what the engine is compared with. It favours plainness over speed, and shares no code with
+the engine: neighbours by full sort, pooled concatenations written out, batch norms not folded.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import torch
@@ -18,7 +20,7 @@ from vnreg_train.networks.registration import RegistrationNetwork
 from vnreg_train.networks.vn import with_pooled
 from vnreg_train.training.batches import network_scale
 
-Stages = dict[str, NDArray[np.generic]]
+Stages = dict[str, NDArray[Any]]
 
 
 def homogeneous(rotation: Tensor, translation: Tensor) -> NDArray[np.float64]:
@@ -103,7 +105,7 @@ class Reference:
         return activations, descriptors, kept
 
 
-def _array(value: Tensor) -> NDArray[np.generic]:
+def _array(value: Tensor) -> NDArray[Any]:
     array = value[0].numpy()
     return array.astype(np.int32) if array.dtype == np.int64 else np.ascontiguousarray(array)
 
@@ -114,7 +116,7 @@ def to_user_units(
     centre_target: NDArray[np.float64],
     scale: float,
 ) -> NDArray[np.float64]:
-    """From network coordinates (each cloud centred and divided by `scale`) to those of the input."""
+    """From network coordinates (clouds centred and divided by `scale`) to the input's."""
     result = pose.copy()
     result[:3, 3] = centre_target + scale * pose[:3, 3] - pose[:3, :3] @ centre_source
     return result

@@ -6,7 +6,9 @@ import torch
 from torch import Tensor
 
 
-def procrustes(source: Tensor, target: Tensor, weight: Tensor | None = None) -> tuple[Tensor, Tensor]:
+def procrustes(
+    source: Tensor, target: Tensor, weight: Tensor | None = None
+) -> tuple[Tensor, Tensor]:
     """Rigid (R, t) that minimises Σ w |R x + t - y|² over paired rows.
 
     source, target: (B, n, 3); weight: (B, n), not negative, any sum; or None for equal weights.

@@ -1,4 +1,4 @@
-"""Hyper-parameters of the paper's network, as they are stored in a configuration and a model file."""
+"""Hyper-parameters of the paper's network, as configurations and model files store them."""
 
 from __future__ import annotations
 

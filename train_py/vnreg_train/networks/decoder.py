@@ -45,8 +45,8 @@ class DecoderBlock(nn.Module):
 class OccupancyDecoder(nn.Module):
     """Is a query inside the shape that a global feature describes? Rotation-invariant.
 
-    Inputs per query q: <q, c_k> for every channel k, and |q|. The condition is the invariant layer's
-    product C Z^T of the global feature itself.
+    Inputs per query q: <q, c_k> for every channel k, and |q|. The condition is the invariant
+    layer's product C Z^T of the global feature itself.
     """
 
     def __init__(self, config: NetworkConfig) -> None:

@@ -1,7 +1,7 @@
 """Edge vectors of the k nearest neighbours: the encoder's input (paper, section III-B1).
 
-Per neighbour j of i the paper takes (x_j - x_i, x_i, x_j × x_i), applies a VN-linear and averages over
-j. Both are linear, so the average can come first: three mean vectors per point, exactly.
+Per neighbour j of i the paper takes (x_j - x_i, x_i, x_j × x_i), applies a VN-linear and averages
+over j. Both are linear, so the average can come first: three mean vectors per point, exactly.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from torch import Tensor
 
 
 def edge_vectors(points: Tensor, neighbour_mean: Tensor) -> Tensor:
-    """Points and the mean of their neighbours, both (B, N, 3) -> (B, N, 3 coordinates, 3 vectors)."""
+    """Points and neighbour means, both (B, N, 3) -> (B, N, 3 coordinates, 3 vectors)."""
     cross = torch.linalg.cross(neighbour_mean, points)
     return torch.stack([neighbour_mean - points, points, cross], dim=-1)
 

@@ -75,8 +75,10 @@ class FineRegister(nn.Module):
         assert isinstance(first, NormedLinear)
         return first.linear.weight
 
-    def compare(self, x: Tensor, y: Tensor, part_x: Tensor, part_y: Tensor) -> tuple[Tensor, Tensor]:
-        """Kept points (B, K, 3) and their feature parts -> similarity (B, Ks, Kt), row maxima (B, Ks, P).
+    def compare(
+        self, x: Tensor, y: Tensor, part_x: Tensor, part_y: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Kept points (B, K, 3) and parts -> similarity (B, Ks, Kt), row maxima (B, Ks, P).
 
         The row maxima are those of the pair features over the target's points.
         """
@@ -109,9 +111,9 @@ class FineRegister(nn.Module):
         return step, rotation, translation
 
     def run(self, x: Tensor, y: Tensor, features_x: Tensor, features_y: Tensor) -> list[FineStep]:
-        """Kept points (B, K, 3), the source already moved by the coarse pose, and descriptors (B, K, D).
+        """All iterations on kept points (B, K, 3) and their descriptors (B, K, D).
 
-        Poses accumulate over the iterations.
+        The source has been moved by the coarse pose; poses accumulate over the iterations.
         """
         part_x, part_y = self.feature_parts(features_x, features_y)
         steps: list[FineStep] = []
@@ -126,7 +128,7 @@ class FineRegister(nn.Module):
         return steps
 
     def keep(self, descriptors: Tensor) -> tuple[Tensor, Tensor]:
-        """Significances (B, N) and the indices (B, N // keep_divisor) of the largest, descending."""
+        """Significances (B, N); indices (B, N // keep_divisor) of the largest, descending."""
         score = self.significance(descriptors).squeeze(-1)
         order = torch.sort(score, dim=-1, descending=True, stable=True).indices
         return score, order[:, : score.shape[1] // self.keep_divisor]
@@ -142,15 +144,13 @@ def training_candidates(
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Points that train the matching: half of them with a true match closer than 0.05.
 
-    source (B, N, 3) at the true pose, target (B, M, 3). Returns source indices (B, keep), the target's
-    nearest point of each (B, keep), and whether that is a true match (B, keep, float).
+    source (B, N, 3) at the true pose, target (B, M, 3). Returns source indices (B, keep), the
+    target's nearest point of each (B, keep), and whether that is a true match (B, keep, float).
     """
     distance, nearest = torch.cdist(source, target).min(2)
     is_match = (distance < MATCH_RADIUS).float()
     positive = torch.multinomial(is_match + 1e-5, keep // 2, generator=generator)
-    negative = torch.multinomial(
-        1 + 1e-5 - is_match, keep - keep // 2, generator=generator
-    )
+    negative = torch.multinomial(1 + 1e-5 - is_match, keep - keep // 2, generator=generator)
     index = torch.cat([positive, negative], dim=1)
     return index, torch.gather(nearest, 1, index), torch.gather(is_match, 1, index)
 

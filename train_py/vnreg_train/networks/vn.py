@@ -1,7 +1,7 @@
 """Vector neurons (paper, section III-B): layers that commute with rotations.
 
-Features are (batch, points, 3, channels): channels last, so that every VN-linear is one plain matrix
-product and x, y, z are three rows of the same kind.
+Features are (batch, points, 3, channels): channels last, so that every VN-linear is one plain
+matrix product and x, y, z are three rows of the same kind.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class VNReLU(nn.Module):
 
 
 class ScalarLinear(nn.Module):
-    """The ablation's counterpart of VNLinear: mixes coordinates and channels, so not equivariant."""
+    """The ablation's VNLinear: mixes coordinates and channels, so it is not equivariant."""
 
     def __init__(self, channels_in: int, channels_out: int) -> None:
         super().__init__()
@@ -70,7 +70,9 @@ def relu(channels: int, vector_neurons: bool, shared_direction: bool) -> nn.Modu
 
 
 class VNResNetBlock(nn.Module):
-    """out = S v + F1 relu1(F0 relu0(v)); S is the identity when the widths agree; F1 starts at zero."""
+    """out = S v + F1 relu1(F0 relu0(v)); S is the identity when the widths agree; F1 starts at
+    zero.
+    """
 
     def __init__(
         self, channels_in: int, channels_out: int, vector_neurons: bool, shared_direction: bool

@@ -1,1 +1,1 @@
-"""Two-stage training (paper, section IV-B): encoder and coarse register first, then the fine one."""
+"""Two-stage training (paper, section IV-B): encoder and coarse register, then the fine one."""

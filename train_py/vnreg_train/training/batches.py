@@ -1,8 +1,8 @@
 """From sampled pairs to network coordinates: what one training step sees.
 
 The clouds of a pair come in one common frame, so the true rotation is the identity. The encoder and
-the coarse register are exactly equivariant, so a rotation would change no loss of the first stage. The
-fine register sees directions in the target's frame; the second stage turns each pair at random.
+the coarse register are exactly equivariant, so a rotation would change no loss of the first stage.
+The fine register sees directions in the target's frame; the second stage turns each pair at random.
 """
 
 from __future__ import annotations
@@ -50,9 +50,7 @@ def make_batch(
     rotation: NDArray[np.float64] | None = None,
 ) -> Batch:
     """Centres, scales, optionally turns each pair by `rotation` (B, 3, 3), and finds the edges."""
-    clouds = {
-        k: np.asarray(v, dtype=np.float64) for k, v in sample.items() if k != "occupancies"
-    }
+    clouds = {k: np.asarray(v, dtype=np.float64) for k, v in sample.items() if k != "occupancies"}
     if rotation is not None:
         clouds = {k: v @ rotation.transpose(0, 2, 1) for k, v in clouds.items()}
     centre_s, centre_t = (clouds[k].mean(1, keepdims=True) for k in ("source", "target"))

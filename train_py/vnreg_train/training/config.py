@@ -24,8 +24,8 @@ class DataConfig:
     folder: str = "data/furniture"
     points: int = 1024
     queries: int = 2048
-    # Neighbours at this density; 0 = the network's. Half the points and half the neighbours cover the
-    # same surface, so a network trained on 512 points with 10 runs on 1,024 with 20.
+    # Neighbours at this density; 0 = the network's. Half the points and half the neighbours cover
+    # the same surface, so a network trained on 512 points with 10 runs on 1,024 with 20.
     neighbours: int = 0
     anisotropic: bool = False  # random scale per axis
     settings: dict[str, float] = field(default_factory=lambda: {"independent": 1.0})

@@ -1,8 +1,8 @@
 """Initial weights that keep features at unit size through the encoder.
 
 With torch's defaults every VN-linear shrinks its input, and the global features of an untrained
-network are of size 1e-5: below the epsilon of VN-ReLU, and collinear. Scaling each layer once, on data,
-starts the training where its gradients carry information.
+network are of size 1e-5: below the epsilon of VN-ReLU, and collinear. Scaling each layer once, on
+data, starts the training where its gradients carry information.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ def scale_initial_weights(extractor: FeatureExtractor, edges: Tensor) -> None:
     """Redraws the encoder's residual branches and scales all its bias-free layers on `edges`.
 
     edges: (B, N, 3, 3). The last layer of each residual branch, which the authors' code starts at
-    zero, starts at random here: a network of shortcuts alone has no use for the clouds' shape, since
-    the mean of centred points is zero.
+    zero, starts at random here: a network of shortcuts alone has no use for the clouds' shape,
+    since the mean of centred points is zero.
     """
     extractor.eval()
     input_size = edges.square().mean((0, 1, 2)).sqrt()
@@ -37,7 +37,7 @@ def scale_initial_weights(extractor: FeatureExtractor, edges: Tensor) -> None:
             module.pre.linear.weight.div_(input_size)  # type: ignore[union-attr,operator]
         if isinstance(module, VNResNetBlock):
             module.fc1.linear.reset_parameters()  # type: ignore[union-attr,operator]
-        if isinstance(module, nn.Linear) and module.bias is None:
+        if isinstance(module, nn.Linear) and "bias" not in dict(module.named_parameters()):
             hooks.append(module.register_forward_hook(_unit_output))
     latent, feature = extractor.global_module(edges)
     extractor.describe(edges, latent, feature)

@@ -27,9 +27,9 @@ def consistency_loss(source: Tensor, target: Tensor) -> Tensor:
     """Ours: how far paired global vectors are apart at the true rotation, whitened; 0 to 4.
 
     source, target: (B, 3, C), unturned. Untrained global features are nearly collinear, and the
-    gradient of Procrustes explodes there. This term measures the difference of the centred vectors in
-    every direction relative to their spread in that direction (a Mahalanobis distance, so it turns
-    with the cloud), which is what decides the accuracy of the rotation about each axis.
+    gradient of Procrustes explodes there. This term measures the difference of the centred vectors
+    in every direction relative to their spread in that direction (a Mahalanobis distance, so it
+    turns with the cloud), which is what decides the accuracy of the rotation about each axis.
     """
     source, target = (v - v.mean(2, keepdim=True) for v in (source, target))
     spread = (_covariance(source) + _covariance(target)) / 2
@@ -70,4 +70,4 @@ def limit_gradient(vectors: Tensor, limit: float) -> Tensor:
 
     With a limit of 0 the gradient is left alone (the paper's training).
     """
-    return _LimitGradient.apply(vectors, limit) if limit > 0 else vectors  # type: ignore[no-any-return]
+    return _LimitGradient.apply(vectors, limit) if limit > 0 else vectors

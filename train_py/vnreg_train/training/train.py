@@ -22,8 +22,8 @@ from vnreg_train.training.checkpoint import (
     save_checkpoint,
     training_state,
 )
-from vnreg_train.training.initial import scale_initial_weights
 from vnreg_train.training.config import StageConfig, TrainingConfig
+from vnreg_train.training.initial import scale_initial_weights
 from vnreg_train.training.stages import CoarseStage, FineStage
 
 STAGES = ("coarse", "fine")
@@ -31,7 +31,7 @@ LOG_EVERY = 50  # steps
 
 
 class StageTrainer:
-    """One stage: the network, its average, the optimiser and the schedule, from start or checkpoint."""
+    """One stage: network, average, optimiser and schedule, new or from a checkpoint."""
 
     def __init__(
         self, config: TrainingConfig, stage: str, shapes: ShapeSet, run_folder: Path
