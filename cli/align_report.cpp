@@ -1,0 +1,127 @@
+#include "align_report.hpp"
+
+#include <array>
+#include <cmath>
+#include <iomanip>
+#include <locale>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <utility>
+
+#include "command.hpp"
+#include "rotation.hpp"
+
+namespace vnreg::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct NamedTime {
+  const char* name;
+  double ms;
+};
+
+std::array<NamedTime, 8> named_times(const StageTimes& ms) {
+  return {{{"prepare", ms.prepare},
+           {"encode", ms.encode},
+           {"coarse", ms.coarse},
+           {"fine", ms.fine},
+           {"hypotheses", ms.hypotheses},
+           {"verify", ms.verify},
+           {"measure", ms.measure},
+           {"total", ms.total}}};
+}
+
+std::string vector_text(const std::array<double, 3>& vector, int digits) {
+  std::string text = "(";
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (axis > 0) text += ", ";
+    text += number_text(vector[axis], digits);
+  }
+  return text + ")";
+}
+
+std::string pose_text(const Pose& pose) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  for (std::size_t row = 0; row < 4; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      text << "  " << std::setw(16) << std::setprecision(10) << pose[4 * row + column];
+    }
+    text << '\n';
+  }
+  return text.str();
+}
+
+Json pose_json(const Result& result, const Pose& pose) {
+  if (!result.has_pose) return nullptr;
+  Json rows = Json::array();
+  for (std::size_t row = 0; row < 4; ++row) {
+    rows.push_back({pose[4 * row], pose[4 * row + 1], pose[4 * row + 2], pose[4 * row + 3]});
+  }
+  return rows;
+}
+
+Json alternatives_json(const Result& result) {
+  Json list = Json::array();
+  for (const Alternative& alternative : result.alternatives) {
+    Json item;
+    item["T_target_source"] = pose_json(result, alternative.T_target_source);
+    item["score"] = alternative.score;
+    list.push_back(std::move(item));
+  }
+  return list;
+}
+
+}  // namespace
+
+std::string to_text(const AlignReport& report) {
+  const Result& result = report.result;
+  const Pose& pose = result.T_target_source;
+  const AxisAngle rotation = axis_angle(pose);
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << "T_target_source\n" << pose_text(pose);
+  text << "rotation     " << number_text(rotation.angle_deg, 6) << " degrees about "
+       << vector_text(rotation.axis, 6) << '\n';
+  text << "translation  " << vector_text({pose[3], pose[7], pose[11]}, 8) << '\n';
+  text << "status       " << to_string(result.status) << '\n';
+  text << "confidence   "
+       << (std::isnan(result.confidence) ? "n/a" : number_text(result.confidence, 3)) << '\n';
+  text << "overlap      " << number_text(result.overlap, 3) << '\n';
+  text << "rmse         " << number_text(result.rmse, 4) << " (of points closer than "
+       << number_text(result.inlier_distance, 4) << ")\n";
+  text << "points       " << result.points_source << " source, " << result.points_target
+       << " target\n";
+  text << "model        " << report.model << ", mode " << to_string(report.mode) << '\n';
+  text << "time        ";
+  for (const NamedTime& time : named_times(result.ms)) {
+    text << ' ' << time.name << ' ' << number_text(time.ms, 3);
+  }
+  text << " ms\n";
+  return text.str();
+}
+
+std::string to_json(const AlignReport& report) {
+  const Result& result = report.result;
+  Json ms;
+  for (const NamedTime& time : named_times(result.ms)) ms[time.name] = time.ms;
+  Json json;
+  json["status"] = to_string(result.status);
+  json["T_target_source"] = pose_json(result, result.T_target_source);
+  json["T_target_source_coarse"] = pose_json(result, result.T_target_source_coarse);
+  json["confidence"] = result.confidence;  // the library writes NaN as null
+  json["overlap"] = result.overlap;
+  json["rmse"] = result.rmse;
+  json["score"] = result.score;
+  json["inlier_distance"] = result.inlier_distance;
+  json["alternatives"] = alternatives_json(result);
+  json["points_source"] = result.points_source;
+  json["points_target"] = result.points_target;
+  json["ms"] = std::move(ms);
+  json["model"] = report.model;
+  json["mode"] = to_string(report.mode);
+  return json.dump(2) + "\n";
+}
+
+}  // namespace vnreg::cli

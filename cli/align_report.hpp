@@ -1,0 +1,23 @@
+// What `vnreg align` prints: for people, or as JSON.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "vnreg/vnreg.hpp"
+
+namespace vnreg::cli {
+
+struct AlignReport {
+  const Result& result;
+  std::string_view model;  // its name
+  Mode mode;
+};
+
+/// Several lines: pose, rotation, translation, status, confidence, overlap, residual, times.
+std::string to_text(const AlignReport& report);
+
+/// One JSON object and a line end; docs/cli.md lists the keys. What is not known is null.
+std::string to_json(const AlignReport& report);
+
+}  // namespace vnreg::cli

@@ -1,0 +1,67 @@
+#include "command.hpp"
+
+#include <iomanip>
+#include <locale>
+#include <sstream>
+
+#include "cloud_file/cloud_file_error.hpp"
+
+namespace vnreg::cli {
+namespace {
+
+ExitCode exit_code(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::invalid_option:
+      return ExitCode::usage;
+    case ErrorCode::unsupported_cpu:
+      return ExitCode::failure;
+    case ErrorCode::file_unreadable:
+    case ErrorCode::not_a_model:
+    case ErrorCode::unsupported_version:
+    case ErrorCode::corrupt_model:
+    case ErrorCode::wrong_architecture:
+    case ErrorCode::missing_tensor:
+      break;
+  }
+  return ExitCode::input;
+}
+
+}  // namespace
+
+CommandError command_error(const Error& error, const std::string& path) {
+  // The field of an unreadable file is its name.
+  const bool field_is_file = error.code() == ErrorCode::file_unreadable && !path.empty();
+  const std::string file = path.empty() ? "" : path + ": ";
+  const std::string field = field_is_file ? "" : error.field() + ": ";
+  return {exit_code(error.code()),
+          file + field + "expected " + error.expected() + ", found " + error.got()};
+}
+
+Model load_model(const std::string& path) {
+  try {
+    return Model::load(path);
+  } catch (const Error& error) {
+    throw command_error(error, path);
+  }
+}
+
+ModeRegistrar make_registrar(const Model& model, Options options, std::optional<Mode> mode) {
+  options.mode = mode.value_or(Mode::paper);
+  try {
+    return {Registrar(model, options), options.mode};
+  } catch (const Error& error) {
+    const bool lacks_fine_register =
+        error.code() == ErrorCode::invalid_option && error.field() == "mode";
+    if (mode || !lacks_fine_register) throw command_error(error, "");
+  }
+  return make_registrar(model, options, Mode::coarse);
+}
+
+std::string number_text(double value, int digits) {
+  std::ostringstream stream;
+  stream.imbue(std::locale::classic());
+  stream << std::setprecision(digits) << value;
+  return stream.str();
+}
+
+}  // namespace vnreg::cli

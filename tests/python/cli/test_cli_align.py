@@ -1,0 +1,240 @@
+"""`vnreg align`, as a user runs it."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cli_clouds import read_ply
+from cli_program import NOT_SURE, OK, Program, moved, random_pose, rotation_error_deg
+from numpy.typing import NDArray
+
+from vnreg_train.model_file import read_model, write_model
+
+Points = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def pose() -> Points:
+    return random_pose(5)
+
+
+@pytest.fixture(scope="module")
+def pair(
+    shape: Points, pose: Points, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Path]:
+    """A cloud, and the same cloud moved and in another order."""
+    folder = tmp_path_factory.mktemp("pair")
+    np.save(folder / "source.npy", shape)
+    target = np.random.default_rng(6).permutation(moved(pose, shape))
+    np.savetxt(folder / "target.xyz", target, fmt="%.17g")
+    return folder / "source.npy", folder / "target.xyz"
+
+
+def without_times(answer: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in answer.items() if key != "ms"}
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("built_in", [False, True], ids=["arbitrary weights", "built-in model"])
+def test_a_moved_cloud_gives_back_its_pose(
+    vnreg: Program, model: Path, shape: Points, tmp_path: Path, built_in: bool, seed: int
+) -> None:
+    # Equivariance makes the clean setting exact, whatever the weights.
+    pose = random_pose(seed)
+    np.save(tmp_path / "a.npy", shape)
+    np.save(tmp_path / "b.npy", np.random.default_rng(seed).permutation(moved(pose, shape)))
+    # Without subsampling, which would take other points of the permuted cloud.
+    arguments = ["--json", "--mode=coarse", "--max-points=300"]
+    if not built_in:
+        arguments += ["--model", str(model)]
+    run = vnreg("align", tmp_path / "a.npy", tmp_path / "b.npy", *arguments)
+    assert run.code == OK
+    found = np.array(run.json()["T_target_source"])
+    assert rotation_error_deg(found, pose) < 0.1
+    assert np.abs(found - pose).max() < 2e-3
+
+
+def test_any_unit_and_any_origin(
+    vnreg: Program, model: Path, shape: Points, tmp_path: Path
+) -> None:
+    # Millimetres in a national grid: the digits of a float would not do.
+    pose = random_pose(11)
+    pose[:3, 3] = [-3.2e6, 5.4e6, 120.0]
+    source = 1000 * shape + [6.5e5, 5.3e6, 400.0]
+    np.save(tmp_path / "a.npy", source)
+    np.save(tmp_path / "b.npy", moved(pose, source))
+    run = vnreg(
+        "align", tmp_path / "a.npy", tmp_path / "b.npy", "--json", "--mode=coarse", "--model", model
+    )
+    found = np.array(run.json()["T_target_source"])
+    assert rotation_error_deg(found, pose) < 0.1
+    assert np.abs(moved(found, source) - moved(pose, source)).max() < 3
+
+
+def test_json_has_the_documented_keys_and_types(
+    vnreg: Program, model: Path, pair: tuple[Path, Path], pose: Points
+) -> None:
+    run = vnreg("align", *pair, "--json", "--model", model)
+    assert run.code == OK
+    answer = run.json()
+    assert list(answer) == [
+        "status",
+        "T_target_source",
+        "T_target_source_coarse",
+        "confidence",
+        "overlap",
+        "rmse",
+        "inlier_distance",
+        "alternatives",
+        "points_source",
+        "points_target",
+        "ms",
+        "model",
+        "mode",
+    ]
+    assert answer["status"] == "ok"
+    for key in ("T_target_source", "T_target_source_coarse"):
+        rows = np.array(answer[key])
+        assert rows.shape == (4, 4) and rows.dtype == np.float64
+        assert np.array_equal(rows[3], [0, 0, 0, 1])
+        assert np.allclose(rows[:3, :3] @ rows[:3, :3].T, np.eye(3), atol=1e-9)
+        assert math.isclose(np.linalg.det(rows[:3, :3]), 1, abs_tol=1e-9)
+    assert answer["confidence"] is None  # this model has no calibration
+    assert 0 <= answer["overlap"] <= 1
+    assert 0 <= answer["rmse"] <= answer["inlier_distance"]
+    assert answer["alternatives"] == []
+    assert (answer["points_source"], answer["points_target"]) == (256, 256)
+    assert list(answer["ms"]) == ["prepare", "encode", "coarse", "fine", "measure", "total"]
+    assert all(isinstance(ms, float | int) and ms >= 0 for ms in answer["ms"].values())
+    assert answer["ms"]["total"] >= answer["ms"]["encode"]
+    assert (answer["model"], answer["mode"]) == ("arbitrary", "paper")
+
+
+def test_text_says_what_json_says(vnreg: Program, model: Path, pair: tuple[Path, Path]) -> None:
+    arguments = ("align", *pair, "--model", model, "--mode", "coarse")
+    answer = vnreg(*arguments, "--json").json()
+    run = vnreg(*arguments)
+    assert (run.code, run.stderr) == (OK, "")
+    lines = run.stdout.splitlines()
+    assert lines[0] == "T_target_source"
+    printed = np.array([[float(word) for word in line.split()] for line in lines[1:5]])
+    found = np.array(answer["T_target_source"])
+    assert np.allclose(printed, found, rtol=1e-9, atol=1e-12)
+    rest = {line.split()[0]: line.split(maxsplit=1)[1] for line in lines[5:]}
+    assert list(rest) == [
+        "rotation",
+        "translation",
+        "status",
+        "confidence",
+        "overlap",
+        "rmse",
+        "points",
+        "model",
+        "time",
+    ]
+    number = r"([-+.\de]+)"
+    match = re.fullmatch(
+        rf"{number} degrees about \({number}, {number}, {number}\)", rest["rotation"]
+    )
+    assert match
+    angle, *axis = (float(text) for text in match.groups())
+    assert math.isclose(
+        1 + 2 * math.cos(math.radians(angle)), np.trace(found[:3, :3]), abs_tol=1e-4
+    )
+    assert np.allclose(found[:3, :3] @ axis, axis, atol=1e-4)
+    assert rest["status"] == "ok"
+    assert rest["confidence"] == "n/a"
+    assert rest["model"] == "arbitrary, mode coarse"
+    assert re.fullmatch(rf"prepare {number} encode {number} .* total {number} ms", rest["time"])
+
+
+def test_output_holds_every_moved_point(
+    vnreg: Program, model: Path, pair: tuple[Path, Path], shape: Points, tmp_path: Path
+) -> None:
+    output = tmp_path / "moved.ply"
+    output.write_text("older")
+    arguments = ("--json", "--model", model, "-o", output, "--max-points", "64")
+    answer = vnreg("align", *pair, *arguments).json()
+    assert (answer["points_source"], answer["points_target"]) == (64, 64)
+    expected = moved(np.array(answer["T_target_source"]), shape)
+    assert np.allclose(read_ply(output), expected, rtol=0, atol=1e-12)
+    assert [path.name for path in tmp_path.iterdir()] == ["moved.ply"]
+
+
+def test_same_bits_whatever_the_threads(
+    vnreg: Program, model: Path, pair: tuple[Path, Path]
+) -> None:
+    answers = [
+        without_times(
+            vnreg("align", *pair, "--json", "--model", model, "--threads", threads).json()
+        )
+        for threads in ("0", "1", "2", "3")
+    ]
+    assert all(answer == answers[0] for answer in answers)
+
+
+def test_the_seed_chooses_the_points(vnreg: Program, model: Path, pair: tuple[Path, Path]) -> None:
+    arguments = ("align", *pair, "--json", "--model", model, "--max-points", "100")
+    first, again, other = (
+        without_times(vnreg(*arguments, "--seed", seed).json())
+        for seed in ("0", "0", "18446744073709551615")
+    )
+    assert first == again
+    assert first["T_target_source"] != other["T_target_source"]
+
+
+@pytest.mark.parametrize(("bias", "code"), [(-50.0, NOT_SURE), (50.0, OK)])
+def test_the_exit_code_says_whether_the_pose_is_trusted(
+    vnreg: Program, model: Path, pair: tuple[Path, Path], tmp_path: Path, bias: float, code: int
+) -> None:
+    metadata, tensors = read_model(model)
+    calibration = {"bias": bias, "overlap": 0.0, "residual": 0.0}
+    metadata |= {f"calibration.{key}": value for key, value in calibration.items()}
+    write_model(tmp_path / "calibrated.vnr", metadata, tensors)
+    arguments = (
+        "align",
+        *pair,
+        "--model",
+        tmp_path / "calibrated.vnr",
+        "-o",
+        tmp_path / "moved.ply",
+    )
+    run = vnreg(*arguments, "--json")
+    assert run.code == code
+    answer = run.json()
+    assert answer["status"] == ("ok" if code == OK else "low_confidence")
+    assert math.isclose(answer["confidence"], 1 / (1 + math.exp(-bias)), abs_tol=1e-6)
+    assert np.array(answer["T_target_source"]).shape == (4, 4)
+    assert len(read_ply(tmp_path / "moved.ply")) == 300
+    run = vnreg(*arguments)
+    assert (run.code, run.stderr) == (code, "")
+    assert f"status       {answer['status']}\n" in run.stdout
+
+
+def test_a_cloud_may_come_through_a_pipe(
+    vnreg: Program, model: Path, pair: tuple[Path, Path]
+) -> None:
+    source, target = pair
+    run = vnreg(
+        "align", "/dev/stdin", target, "--json", "--model", model, stdin=source.read_bytes()
+    )
+    assert without_times(run.json()) == without_times(
+        vnreg("align", source, target, "--json", "--model", model).json()
+    )
+
+
+def test_names_with_blanks_and_beyond_ascii(
+    vnreg: Program, model: Path, pair: tuple[Path, Path], tmp_path: Path
+) -> None:
+    source, target = tmp_path / "größe 1.npy", tmp_path / "-dash.xyz"
+    shutil.copy(pair[0], source)
+    shutil.copy(pair[1], target)
+    output = tmp_path / "naïve 2.PLY"
+    assert vnreg("align", "--model", model, "-o", output, "--", source, target).code == OK
+    assert output.is_file()
