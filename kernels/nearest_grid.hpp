@@ -1,0 +1,64 @@
+// A grid of cells over a cloud, each with the point nearest to its centre: nearest neighbours in a
+// few nanoseconds, for the many poses whose fit only has to be compared.
+//
+// A query takes the point of its cell. If the cell's centre is c and the query q lies in the cell,
+// |q - c| <= e, half the cell's diagonal; with p the point found and p* the nearest of all,
+//   |q - p| <= |q - c| + |c - p| <= e + |c - p*| <= 2 e + |q - p*|,
+// so the point found is at most one cell diagonal farther than the nearest.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/neighbours.hpp"
+#include "kernels/spatial_index.hpp"
+
+namespace vnreg::kernels {
+
+class NearestGrid {
+ public:
+  /// Cells along the longest side of the box. A multiple of `block`.
+  static constexpr Index cells = 28;
+  /// Cells along the sides of the cubes that share one search.
+  static constexpr Index block = 4;
+
+  /// Allocates for clouds of at most 65,536 points.
+  void allocate() { nearest_.resize(static_cast<std::size_t>(cells * cells * cells)); }
+
+  /// Lays cubic cells over the bounding box of the points, widened by `margin` (positive) on all
+  /// sides. Within a block whose cells' centres are all farther than `reach` from every point, all
+  /// cells hold the point nearest to the block's centre: the bound above then does not hold.
+  void place(const SpatialIndex& index, float margin, float reach) noexcept;
+  /// Searches for the cells of the blocks [first, last) of blocks(). Blocks are independent.
+  void fill(const SpatialIndex& index, Index first, Index last, NeighbourScratch& scratch) noexcept;
+
+  Index blocks() const noexcept {
+    return counts_[0] * counts_[1] * counts_[2] / (block * block * block);
+  }
+  float cell_size() const noexcept { return size_; }
+
+  /// A place in the input of the index. Outside of the box: that of the cell of the box nearest by.
+  std::uint16_t nearest(float x, float y, float z) const noexcept {
+    const Index cell =
+        (place_along(2, z) * counts_[1] + place_along(1, y)) * counts_[0] + place_along(0, x);
+    return nearest_[static_cast<std::size_t>(cell)];
+  }
+
+ private:
+  Index place_along(int axis, float value) const noexcept {
+    const float place = (value - low_[axis]) * per_size_;
+    // In this order NaN gives 0.
+    const float raised = place > 0.0f ? place : 0.0f;
+    return static_cast<Index>(static_cast<std::int32_t>(raised < last_[axis] ? raised : last_[axis]));
+  }
+
+  float low_[3] = {0, 0, 0};
+  float last_[3] = {0, 0, 0};  // cells along the axis, less one
+  Index counts_[3] = {0, 0, 0};
+  float size_ = 1;
+  float per_size_ = 1;
+  float reach_ = 0;
+  std::vector<std::uint16_t> nearest_;
+};
+
+}  // namespace vnreg::kernels

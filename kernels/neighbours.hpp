@@ -1,0 +1,40 @@
+// Exact nearest neighbours on a SpatialIndex.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/spatial_index.hpp"
+
+namespace vnreg::kernels {
+
+/// Working memory of one thread.
+struct NeighbourScratch {
+  Floats bounds;                        // one per leaf
+  std::vector<std::uint64_t> keys;      // candidates: squared distance's bits, then original index
+  std::vector<std::uint64_t> selected;  // a copy that the selection reorders
+  std::vector<std::uint32_t> places;    // candidates: place in the order
+
+  NeighbourScratch() = default;
+  explicit NeighbourScratch(Index max_points);
+};
+
+/// For each point i of the leaves [first_leaf, last_leaf): the mean of x_j - x_i over its k nearest
+/// points j, i included (1 <= k <= count; equal distances: the lower index first), and the squared
+/// distance to the nearest point other than i itself (infinite when there is none). Outputs are
+/// indexed like the input points.
+void mean_neighbour_offsets(const SpatialIndex& index, Index k, Index first_leaf, Index last_leaf,
+                            NeighbourScratch& scratch, float* offset_x, float* offset_y,
+                            float* offset_z, float* spacing_squared) noexcept;
+
+/// neighbours[k * i + n], n = 0..k-1: the k points nearest to input point i of those leaves, itself
+/// included, in no particular order (1 <= k <= count; equal distances: the lower index first).
+void nearest_points(const SpatialIndex& index, Index k, Index first_leaf, Index last_leaf,
+                    NeighbourScratch& scratch, std::uint16_t* neighbours) noexcept;
+
+/// squared[i] = squared distance from query i to the nearest point of the index. Fast when
+/// consecutive queries are near each other, as in the order of another index.
+void nearest_distances(const SpatialIndex& index, const Coordinates& queries, Index count,
+                       NeighbourScratch& scratch, float* squared) noexcept;
+
+}  // namespace vnreg::kernels

@@ -1,0 +1,128 @@
+#include "kernels/spatial_index.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace vnreg::kernels {
+namespace {
+
+// Its square overflows to infinity, so padding is beyond every finite bound.
+constexpr float beyond = 1e30f;
+
+inline float squared_distance(float dx, float dy, float dz) noexcept {
+  return (dx * dx + dy * dy) + dz * dz;
+}
+
+/// How far q lies outside [low, high], 0 inside.
+inline float outside(float q, float low, float high) noexcept {
+  const float below = low - q;
+  const float above = q - high;
+  const float farther = below > above ? below : above;
+  return farther > 0.0f ? farther : 0.0f;
+}
+
+}  // namespace
+
+SpatialIndex::SpatialIndex(Index max_points) {
+  const auto leaves = static_cast<std::size_t>((max_points + leaf_size - 1) / leaf_size);
+  const std::size_t points = leaves * static_cast<std::size_t>(leaf_size);
+  items_.resize(points);
+  original_.resize(points);
+  for (Floats* array : {&x_, &y_, &z_}) array->resize(points);
+  for (Index axis = 0; axis < 3; ++axis) {
+    low_[axis].resize(leaves);
+    high_[axis].resize(leaves);
+  }
+}
+
+void SpatialIndex::build(const Coordinates& points, Index count) noexcept {
+  count_ = count;
+  Item* items = items_.data();
+  for (Index i = 0; i < count; ++i) {
+    items[i] = {{points.x[i], points.y[i], points.z[i]}, static_cast<std::uint32_t>(i)};
+  }
+  split(0, count);
+  for (Index i = 0; i < count; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    x_[at] = items[i].position[0];
+    y_[at] = items[i].position[1];
+    z_[at] = items[i].position[2];
+    original_[at] = items[i].original;
+  }
+  store_boxes();
+  for (auto i = static_cast<std::size_t>(count); i < static_cast<std::size_t>(leaves() * leaf_size);
+       ++i) {
+    x_[i] = y_[i] = z_[i] = beyond;
+    original_[i] = std::numeric_limits<std::uint32_t>::max();
+  }
+}
+
+/// Halves [first, last) at a leaf boundary across the longest side of its box, down to single
+/// leaves.
+void SpatialIndex::split(Index first, Index last) noexcept {
+  if (last - first <= leaf_size) return;
+  Item* items = items_.data();
+  Index widest = 0;
+  float widest_side = -1.0f;
+  for (Index axis = 0; axis < 3; ++axis) {
+    float low = items[first].position[axis];
+    float high = low;
+    for (Index i = first + 1; i < last; ++i) {
+      low = std::min(low, items[i].position[axis]);
+      high = std::max(high, items[i].position[axis]);
+    }
+    if (high - low > widest_side) {
+      widest_side = high - low;
+      widest = axis;
+    }
+  }
+  const Index leaves = (last - first + leaf_size - 1) / leaf_size;
+  const Index middle = first + (leaves + 1) / 2 * leaf_size;
+  std::nth_element(
+      items + first, items + middle, items + last,
+      [widest](const Item& a, const Item& b) { return a.position[widest] < b.position[widest]; });
+  split(first, middle);
+  split(middle, last);
+}
+
+void SpatialIndex::store_boxes() noexcept {
+  const float* coordinates[3] = {x_.data(), y_.data(), z_.data()};
+  for (Index leaf = 0; leaf < leaves(); ++leaf) {
+    const Index first = leaf * leaf_size;
+    const Index last = std::min(first + leaf_size, count_);
+    for (Index axis = 0; axis < 3; ++axis) {
+      const auto [low, high] =
+          std::minmax_element(coordinates[axis] + first, coordinates[axis] + last);
+      low_[axis][static_cast<std::size_t>(leaf)] = *low;
+      high_[axis][static_cast<std::size_t>(leaf)] = *high;
+    }
+  }
+}
+
+void SpatialIndex::leaf_bounds(float x, float y, float z, float* bounds) const noexcept {
+  const float* low_x = low_[0].data();
+  const float* low_y = low_[1].data();
+  const float* low_z = low_[2].data();
+  const float* high_x = high_[0].data();
+  const float* high_y = high_[1].data();
+  const float* high_z = high_[2].data();
+  const Index n = leaves();
+#pragma omp simd
+  for (Index l = 0; l < n; ++l) {
+    bounds[l] = squared_distance(outside(x, low_x[l], high_x[l]), outside(y, low_y[l], high_y[l]),
+                                 outside(z, low_z[l], high_z[l]));
+  }
+}
+
+void SpatialIndex::leaf_distances(Index leaf, float x, float y, float z,
+                                  float* squared) const noexcept {
+  const float* px = x_.data() + leaf * leaf_size;
+  const float* py = y_.data() + leaf * leaf_size;
+  const float* pz = z_.data() + leaf * leaf_size;
+#pragma omp simd
+  for (Index i = 0; i < leaf_size; ++i) {
+    squared[i] = squared_distance(px[i] - x, py[i] - y, pz[i] - z);
+  }
+}
+
+}  // namespace vnreg::kernels

@@ -1,0 +1,63 @@
+// Points in an order in which near points are near in memory, in leaves of 16 with bounding boxes.
+//
+// Exact neighbour search then needs no tree: a query compares its bound with the boxes of all
+// leaves (vectorised) and visits the few leaves that pass. The bound of a query comes from the
+// query before it, its neighbour in the order, by the triangle inequality. All squared distances
+// are (dx*dx + dy*dy) + dz*dz in float32, without fused operations; the box bound uses the same
+// operations and rounding is monotone, so it never exceeds a distance in its leaf.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/packets.hpp"
+
+namespace vnreg::kernels {
+
+/// Coordinates as three arrays.
+struct Coordinates {
+  const float* x;
+  const float* y;
+  const float* z;
+};
+
+class SpatialIndex {
+ public:
+  static constexpr Index leaf_size = 16;
+
+  SpatialIndex() = default;
+  /// Allocates for at most `max_points` points.
+  explicit SpatialIndex(Index max_points);
+
+  /// Orders `count` (1 to max_points) finite points with squares far below the largest float.
+  void build(const Coordinates& points, Index count) noexcept;
+
+  Index count() const noexcept { return count_; }
+  Index leaves() const noexcept { return (count_ + leaf_size - 1) / leaf_size; }
+  /// The points in order; behind the last one, padding at an infinite distance from any point.
+  Coordinates ordered() const noexcept { return {x_.data(), y_.data(), z_.data()}; }
+  /// original()[i] is the place in the input of the i-th point of the order.
+  const std::uint32_t* original() const noexcept { return original_.data(); }
+
+  /// bounds[l] = a squared distance that no point of leaf l falls below, seen from (x, y, z).
+  void leaf_bounds(float x, float y, float z, float* bounds) const noexcept;
+  /// The squared distances from (x, y, z) to the 16 points of a leaf, infinite for padding.
+  void leaf_distances(Index leaf, float x, float y, float z, float* squared) const noexcept;
+
+ private:
+  struct Item {
+    float position[3];
+    std::uint32_t original;
+  };
+
+  void split(Index first, Index last) noexcept;
+  void store_boxes() noexcept;
+
+  Index count_ = 0;
+  std::vector<Item> items_;
+  Floats x_, y_, z_;
+  std::vector<std::uint32_t> original_;
+  Floats low_[3], high_[3];
+};
+
+}  // namespace vnreg::kernels
