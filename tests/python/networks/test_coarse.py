@@ -51,3 +51,9 @@ def test_gradient_agrees_with_differences() -> None:
     rng = np.random.default_rng(1)
     x, y = (torch.from_numpy(rng.normal(size=(2, 8, 3))).requires_grad_() for _ in range(2))
     assert torch.autograd.gradcheck(procrustes, (x, y))
+
+
+def test_weights_that_are_all_zero_give_the_identity() -> None:
+    x, y = torch.randn(1, 5, 3), torch.randn(1, 5, 3)
+    r, t = procrustes(x, y, torch.zeros(1, 5))
+    assert torch.allclose(r, torch.eye(3)) and torch.allclose(t, torch.zeros(1, 3))

@@ -11,13 +11,14 @@ def procrustes(
 ) -> tuple[Tensor, Tensor]:
     """Rigid (R, t) that minimises Σ w |R x + t - y|² over paired rows.
 
-    source, target: (B, n, 3); weight: (B, n), not negative, any sum; or None for equal weights.
+    source, target: (B, n, 3); weight: (B, n), not negative, or None for equal weights. Weights that
+    are all zero give the identity.
     Returns R (B, 3, 3) with determinant +1 and t (B, 3). Solved in float64; differentiable. The
     centroids are weighted in the covariance too (the authors' code takes unweighted ones there).
     """
     x, y = source.double(), target.double()
     w = torch.ones_like(x[..., 0]) if weight is None else weight.double()
-    w = (w / w.sum(1, keepdim=True)).unsqueeze(-1)
+    w = (w / w.sum(1, keepdim=True).clamp(min=1e-300)).unsqueeze(-1)
     x_mean, y_mean = (w * x).sum(1, keepdim=True), (w * y).sum(1, keepdim=True)
     covariance = (w * (y - y_mean)).transpose(1, 2) @ (x - x_mean)
     u, _, vh = torch.linalg.svd(covariance)
