@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vnreg_train.export.reference import Reference
 from vnreg_train.export.tensors import engine_tensors
-from vnreg_train.model_file import read_model, write_model
+from vnreg_train.model_file import read_checksum, read_model, write_model
 from vnreg_train.networks.config import NetworkConfig
 from vnreg_train.networks.registration import RegistrationNetwork
 
@@ -97,4 +97,9 @@ def export_golden(
     tensors: dict[str, NDArray[np.generic]] = {"input.source": source, "input.target": target}
     stages.pop("T_target_source")  # the rest is in network coordinates
     tensors |= {f"stage.{name}": value for name, value in stages.items()}
-    write_model(path, {"arch": "golden", "model.name": metadata["name"]}, tensors)
+    golden: Metadata = {
+        "arch": "golden",
+        "model.name": str(metadata["name"]),
+        "model.crc": read_checksum(model_path),
+    }
+    write_model(path, golden, tensors)
