@@ -10,10 +10,12 @@ namespace vnreg::kernels {
 
 /// Working memory of one thread.
 struct NeighbourScratch {
-  Floats bounds;                        // one per leaf
-  std::vector<std::uint64_t> keys;      // candidates: squared distance's bits, then original index
-  std::vector<std::uint64_t> selected;  // a copy that the selection reorders
-  std::vector<std::uint32_t> places;    // candidates: place in the order
+  Floats bounds, far_bounds;  // one per leaf
+  // The points of the leaves that may matter to the queries at hand.
+  Floats x, y, z;
+  std::vector<std::int32_t> original;
+  Floats squared;                  // their distances from one query
+  std::vector<std::int32_t> tied;  // those at the distance of the k-th nearest
 
   NeighbourScratch() = default;
   explicit NeighbourScratch(Index max_points);

@@ -21,7 +21,33 @@ inline float outside(float q, float low, float high) noexcept {
   return farther > 0.0f ? farther : 0.0f;
 }
 
+/// How far [a_low, a_high] and [b_low, b_high] are apart, 0 when they overlap.
+inline float gap(float a_low, float a_high, float b_low, float b_high) noexcept {
+  const float below = b_low - a_high;
+  const float above = a_low - b_high;
+  const float farther = below > above ? below : above;
+  return farther > 0.0f ? farther : 0.0f;
+}
+
+/// The largest difference between a number of each interval.
+inline float span(float a_low, float a_high, float b_low, float b_high) noexcept {
+  const float up = b_high - a_low;
+  const float down = a_high - b_low;
+  return up > down ? up : down;
+}
+
 }  // namespace
+
+Box box_of(const Coordinates& points, Index count) noexcept {
+  const float* coordinates[3] = {points.x, points.y, points.z};
+  Box box;
+  for (Index axis = 0; axis < 3; ++axis) {
+    const auto [low, high] = std::minmax_element(coordinates[axis], coordinates[axis] + count);
+    box.low[axis] = *low;
+    box.high[axis] = *high;
+  }
+  return box;
+}
 
 SpatialIndex::SpatialIndex(Index max_points) {
   const auto leaves = static_cast<std::size_t>((max_points + leaf_size - 1) / leaf_size);
@@ -86,16 +112,38 @@ void SpatialIndex::split(Index first, Index last) noexcept {
 }
 
 void SpatialIndex::store_boxes() noexcept {
-  const float* coordinates[3] = {x_.data(), y_.data(), z_.data()};
   for (Index leaf = 0; leaf < leaves(); ++leaf) {
     const Index first = leaf * leaf_size;
-    const Index last = std::min(first + leaf_size, count_);
+    const Box box = box_of({x_.data() + first, y_.data() + first, z_.data() + first},
+                           std::min(leaf_size, count_ - first));
     for (Index axis = 0; axis < 3; ++axis) {
-      const auto [low, high] =
-          std::minmax_element(coordinates[axis] + first, coordinates[axis] + last);
-      low_[axis][static_cast<std::size_t>(leaf)] = *low;
-      high_[axis][static_cast<std::size_t>(leaf)] = *high;
+      low_[axis][static_cast<std::size_t>(leaf)] = box.low[axis];
+      high_[axis][static_cast<std::size_t>(leaf)] = box.high[axis];
     }
+  }
+}
+
+Box SpatialIndex::box(Index leaf) const noexcept {
+  const auto at = static_cast<std::size_t>(leaf);
+  return {{low_[0][at], low_[1][at], low_[2][at]}, {high_[0][at], high_[1][at], high_[2][at]}};
+}
+
+void SpatialIndex::box_bounds(const Box& box, float* nearest, float* farthest) const noexcept {
+  const float* low_x = low_[0].data();
+  const float* low_y = low_[1].data();
+  const float* low_z = low_[2].data();
+  const float* high_x = high_[0].data();
+  const float* high_y = high_[1].data();
+  const float* high_z = high_[2].data();
+  const Index n = leaves();
+#pragma omp simd
+  for (Index l = 0; l < n; ++l) {
+    nearest[l] = squared_distance(gap(box.low[0], box.high[0], low_x[l], high_x[l]),
+                                  gap(box.low[1], box.high[1], low_y[l], high_y[l]),
+                                  gap(box.low[2], box.high[2], low_z[l], high_z[l]));
+    farthest[l] = squared_distance(span(box.low[0], box.high[0], low_x[l], high_x[l]),
+                                   span(box.low[1], box.high[1], low_y[l], high_y[l]),
+                                   span(box.low[2], box.high[2], low_z[l], high_z[l]));
   }
 }
 

@@ -21,6 +21,14 @@ struct Coordinates {
   const float* z;
 };
 
+struct Box {
+  float low[3];
+  float high[3];
+};
+
+/// The smallest box around `count` >= 1 points.
+Box box_of(const Coordinates& points, Index count) noexcept;
+
 class SpatialIndex {
  public:
   static constexpr Index leaf_size = 16;
@@ -39,6 +47,10 @@ class SpatialIndex {
   /// original()[i] is the place in the input of the i-th point of the order.
   const std::uint32_t* original() const noexcept { return original_.data(); }
 
+  Box box(Index leaf) const noexcept;
+  /// For each leaf: squared distances that no pair of a point of `box` and a point of the leaf
+  /// falls below (nearest) or exceeds (farthest).
+  void box_bounds(const Box& box, float* nearest, float* farthest) const noexcept;
   /// bounds[l] = a squared distance that no point of leaf l falls below, seen from (x, y, z).
   void leaf_bounds(float x, float y, float z, float* bounds) const noexcept;
   /// The squared distances from (x, y, z) to the 16 points of a leaf, infinite for padding.

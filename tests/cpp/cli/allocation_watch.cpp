@@ -9,14 +9,20 @@ namespace {
 std::atomic<std::size_t> largest_request{0};
 }  // namespace
 
-void* operator new(std::size_t size) {
+// All forms for single objects, so that none of a sanitizer's own meets one of these.
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
   largest_request = std::max(largest_request.load(), size);
-  if (void* memory = std::malloc(std::max<std::size_t>(size, 1))) return memory;
+  return std::malloc(std::max<std::size_t>(size, 1));
+}
+
+void* operator new(std::size_t size) {
+  if (void* memory = operator new(size, std::nothrow)) return memory;
   throw std::bad_alloc();
 }
 
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete(void* memory, const std::nothrow_t&) noexcept { std::free(memory); }
 
 namespace vnreg::test {
 

@@ -47,12 +47,15 @@ inline Points whole_points(Random& random, std::size_t count, int low = 0, int h
 }
 
 /// `text` with every occurrence of `from` replaced.
-inline std::string replaced(std::string text, std::string_view from, std::string_view to) {
-  for (std::size_t at = text.find(from); at != std::string::npos;
-       at = text.find(from, at + to.size())) {
-    text.replace(at, from.size(), to);
+inline std::string replaced(std::string_view text, std::string_view from, std::string_view to) {
+  std::string result;
+  for (std::size_t at = text.find(from); at != std::string_view::npos; at = text.find(from)) {
+    result += text.substr(0, at);
+    result += to;
+    text.remove_prefix(at + from.size());
   }
-  return text;
+  result += text;
+  return result;
 }
 
 /// The text of the error that parsing gives; fails the test if it gives none or another exception.

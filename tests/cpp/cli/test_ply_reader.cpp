@@ -276,7 +276,7 @@ TEST_CASE("PLY: surplus values on rows of text are ignored but for points", "[pl
 TEST_CASE("PLY: two elements 'vertex', or x in a list, are refused", "[ply]") {
   CHECK(error_of(header("ascii", std::string(plain_vertex) + std::string(plain_vertex)), "a.ply") ==
         "expected one element 'vertex' in the header, found 2");
-  const std::string list = replaced(std::string(plain_vertex), "float x", "list uchar float x");
+  const std::string list = replaced(plain_vertex, "float x", "list uchar float x");
   CHECK(error_of(header("ascii", list), "a.ply") ==
         "expected one number 'x' in element 'vertex' of the header, found 0");
 }
@@ -285,7 +285,7 @@ TEST_CASE("PLY: a small file that claims a huge number of rows allocates nothing
   const std::string count =
       GENERATE("1000000000000000000", "18446744073709551615", "2147483648", "100");
   const std::string format = GENERATE("ascii", "binary_little_endian", "binary_big_endian");
-  const std::string vertex = replaced(std::string(plain_vertex), " 2", " " + count);
+  const std::string vertex = replaced(plain_vertex, " 2", " " + count);
   CHECK_FALSE(survives(header(format, vertex) + "1 2 3\n", "a.ply"));
   const std::string before = "element face " + count + "\nproperty list uchar int v\n";
   CHECK_FALSE(survives(header(format, before + std::string(plain_vertex)) + "1 2 3\n", "a.ply"));

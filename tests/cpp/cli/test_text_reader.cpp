@@ -84,16 +84,19 @@ TEST_CASE("text: random rows of every delimiter come back exactly", "[text]") {
   const std::string end = pick(random, 0, 1) == 0 ? "\n" : "\r\n";
   std::uniform_real_distribution<double> coordinate(-1e6, 1e6);
   Points points(pick(random, 1, 40));
-  std::string text = pick(random, 0, 1) == 0 ? "" : "x" + delimiter + "y" + delimiter + "z" + end;
+  std::string text;
+  if (pick(random, 0, 1) == 0) text = "x" + delimiter + "y" + delimiter + "z" + end;
   for (auto& point : points) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       point[axis] = coordinate(random);
       char number[40];
       std::snprintf(number, sizeof(number), pick(random, 0, 1) == 0 ? "%.17g" : "%.17e",
                     point[axis]);
-      text += (axis == 0 ? "" : delimiter) + number;
+      if (axis > 0) text += delimiter;
+      text += number;
     }
-    text += (pick(random, 0, 1) == 0 ? "" : delimiter + "extra") + end;
+    if (pick(random, 0, 1) == 0) text += delimiter + "extra";
+    text += end;
   }
   check_equal(parse_cloud(text, "a.txt"), points);
 }

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vnreg_train.export.model import export_golden, export_model
 from vnreg_train.export.reference import Reference
-from vnreg_train.model_file import read_checksum, read_model, write_model
+from vnreg_train.model_file import read_model, write_model
 from vnreg_train.networks.config import NetworkConfig
 from vnreg_train.networks.registration import RegistrationNetwork
 
@@ -88,7 +88,7 @@ def golden(network: RegistrationNetwork, model: Path, shape: NDArray[np.float64]
     metadata, tensors = read_model(path)
     # With arbitrary weights the similarities magnify the rounding of the coarse pose.
     kept = {name: tensor for name, tensor in tensors.items() if not name.endswith("similarity")}
-    write_model(path, metadata | {"model.crc": read_checksum(model)}, kept)
+    write_model(path, metadata, kept)
     return path
 
 

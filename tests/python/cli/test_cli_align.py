@@ -11,7 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 from cli_clouds import read_ply
-from cli_program import NOT_SURE, OK, Program, moved, random_pose, rotation_error_deg
+from cli_program import (
+    NOT_SURE,
+    OK,
+    Program,
+    moved,
+    random_pose,
+    repository,
+    rotation_error_deg,
+)
 from numpy.typing import NDArray
 
 from vnreg_train.model_file import read_model, write_model
@@ -77,43 +85,66 @@ def test_any_unit_and_any_origin(
     assert np.abs(moved(found, source) - moved(pose, source)).max() < 3
 
 
+def check_pose(rows: object) -> None:
+    pose = np.array(rows)
+    assert pose.shape == (4, 4) and pose.dtype == np.float64
+    assert np.array_equal(pose[3], [0, 0, 0, 1])
+    assert np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-9)
+    assert math.isclose(np.linalg.det(pose[:3, :3]), 1, abs_tol=1e-9)
+
+
+@pytest.mark.parametrize("mode", ["coarse", "paper", "verified"])
 def test_json_has_the_documented_keys_and_types(
-    vnreg: Program, model: Path, pair: tuple[Path, Path], pose: Points
+    vnreg: Program, model: Path, pair: tuple[Path, Path], mode: str
 ) -> None:
-    run = vnreg("align", *pair, "--json", "--model", model)
+    run = vnreg("align", *pair, "--json", "--model", model, "--mode", mode)
     assert run.code == OK
     answer = run.json()
-    assert list(answer) == [
-        "status",
-        "T_target_source",
-        "T_target_source_coarse",
-        "confidence",
-        "overlap",
-        "rmse",
-        "inlier_distance",
-        "alternatives",
-        "points_source",
-        "points_target",
-        "ms",
-        "model",
-        "mode",
-    ]
+    documented = (repository / "docs" / "cli.md").read_text().partition("Keys of the JSON")[2]
+    keys = documented.partition("\n\n")[2].partition("\n\n")[0].splitlines()[2:]
+    assert sorted(answer) == sorted(re.findall(r"`(\w+)`", " ".join(k.split("|")[1] for k in keys)))
     assert answer["status"] == "ok"
-    for key in ("T_target_source", "T_target_source_coarse"):
-        rows = np.array(answer[key])
-        assert rows.shape == (4, 4) and rows.dtype == np.float64
-        assert np.array_equal(rows[3], [0, 0, 0, 1])
-        assert np.allclose(rows[:3, :3] @ rows[:3, :3].T, np.eye(3), atol=1e-9)
-        assert math.isclose(np.linalg.det(rows[:3, :3]), 1, abs_tol=1e-9)
+    check_pose(answer["T_target_source"])
+    check_pose(answer["T_target_source_coarse"])
     assert answer["confidence"] is None  # this model has no calibration
     assert 0 <= answer["overlap"] <= 1
     assert 0 <= answer["rmse"] <= answer["inlier_distance"]
-    assert answer["alternatives"] == []
+    if mode == "verified":
+        assert 0 < answer["score"] <= 1
+    else:
+        assert answer["score"] is None
+        assert answer["alternatives"] == []
     assert (answer["points_source"], answer["points_target"]) == (256, 256)
-    assert list(answer["ms"]) == ["prepare", "encode", "coarse", "fine", "measure", "total"]
-    assert all(isinstance(ms, float | int) and ms >= 0 for ms in answer["ms"].values())
-    assert answer["ms"]["total"] >= answer["ms"]["encode"]
-    assert (answer["model"], answer["mode"]) == ("arbitrary", "paper")
+    times = answer["ms"]
+    assert list(times)[:4] == ["prepare", "encode", "coarse", "fine"]
+    assert list(times)[-2:] == ["measure", "total"]
+    assert all(isinstance(ms, float | int) and ms >= 0 for ms in times.values())
+    assert times["total"] >= times["encode"]
+    assert (answer["model"], answer["mode"]) == ("arbitrary", mode)
+
+
+def test_a_symmetric_body_is_ambiguous(
+    vnreg: Program, model: Path, shape: Points, tmp_path: Path
+) -> None:
+    # Half a turn about z maps the body onto itself.
+    body = np.concatenate([shape[:150] + [0, 1, 0], (shape[:150] + [0, 1, 0]) * [-1, -1, 1]])
+    np.save(tmp_path / "a.npy", body)
+    np.save(tmp_path / "b.npy", moved(random_pose(9), body))
+    arguments = ("--json", "--model", model, "--mode=verified", "--max-points=300")
+    run = vnreg("align", tmp_path / "a.npy", tmp_path / "b.npy", *arguments)
+    assert run.code == NOT_SURE
+    answer = run.json()
+    assert answer["status"] == "ambiguous"
+    assert answer["alternatives"]
+    half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
+    poses = [answer, *answer["alternatives"]]
+    for expected in (random_pose(9), random_pose(9) @ half_turn):
+        errors = [rotation_error_deg(np.array(p["T_target_source"]), expected) for p in poses]
+        assert min(errors) < 2
+    for alternative in answer["alternatives"]:
+        assert list(alternative) == ["T_target_source", "score"]
+        check_pose(alternative["T_target_source"])
+        assert 0 < alternative["score"] <= answer["score"]
 
 
 def test_text_says_what_json_says(vnreg: Program, model: Path, pair: tuple[Path, Path]) -> None:

@@ -1,0 +1,84 @@
+#include "engine/architecture.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+namespace vnreg::detail {
+namespace {
+
+using model_format::ModelFile;
+
+constexpr std::uint64_t max_channels = 512;
+
+Index read_index(const ModelFile& file, std::string_view key, std::uint64_t min,
+                 std::uint64_t max) {
+  return static_cast<Index>(file.get_u64(key, min, max));
+}
+
+[[noreturn]] void refuse(std::string_view key, std::string expected, std::string got) {
+  throw Error(ErrorCode::wrong_architecture, "metadata \"" + std::string(key) + "\"",
+              std::move(expected), std::move(got));
+}
+
+std::string read_name(const ModelFile& file) {
+  std::string name = file.get_string("name");
+  if (name.empty() || name.size() > 64) {
+    refuse("name", "1 to 64 characters", std::to_string(name.size()));
+  }
+  return name;
+}
+
+double read_rms_radius(const ModelFile& file) {
+  const double radius = file.get_f64("input.rms_radius", 0.0, 1e3);
+  if (radius != 0.0 && radius < 1e-3) {
+    refuse("input.rms_radius", "0 or 1e-3 to 1e3", std::to_string(radius));
+  }
+  return radius;
+}
+
+}  // namespace
+
+Index Architecture::min_points() const noexcept {
+  return std::max({neighbours, 3 * keep_divisor, Index{24}});
+}
+
+Architecture read_architecture(const ModelFile& file) {
+  if (const std::string arch = file.get_string("arch"); arch != "paper") {
+    refuse("arch", "paper", arch);
+  }
+  Architecture a;
+  a.name = read_name(file);
+  a.channels_global = read_index(file, "channels.global", 4, max_channels);
+  a.channels_local = read_index(file, "channels.local", 4, max_channels);
+  if (a.channels_local % 4 != 0) {
+    refuse("channels.local", "a multiple of 4", std::to_string(a.channels_local));
+  }
+  a.channels_descriptor = read_index(file, "channels.descriptor", 1, max_channels);
+  a.channels_pair = read_index(file, "channels.pair", 1, max_channels);
+  a.channels_significance[0] = read_index(file, "channels.significance.0", 1, max_channels);
+  a.channels_significance[1] = read_index(file, "channels.significance.1", 1, max_channels);
+  a.neighbours = read_index(file, "neighbours", 1, 64);
+  a.shared_direction = file.get_bool("relu.shared_direction");
+  a.fine_iterations = read_index(file, "fine.iterations", 0, 16);
+  a.keep_divisor = read_index(file, "fine.keep_divisor", 1, 64);
+  a.rms_radius = read_rms_radius(file);
+  a.points = read_index(file, "input.points",
+                        static_cast<std::uint64_t>(std::max(Index{64}, a.min_points())), 16384);
+  return a;
+}
+
+std::optional<Calibration> read_calibration(const ModelFile& file) {
+  constexpr std::array<std::string_view, 3> keys{"calibration.bias", "calibration.overlap",
+                                                 "calibration.residual"};
+  if (std::none_of(keys.begin(), keys.end(), [&](auto key) { return file.has(key); })) {
+    return std::nullopt;
+  }
+  const auto read = [&file](std::string_view key) {
+    constexpr double limit = std::numeric_limits<double>::max();
+    return file.get_f64(key, -limit, limit);
+  };
+  return Calibration{read(keys[0]), read(keys[1]), read(keys[2])};
+}
+
+}  // namespace vnreg::detail

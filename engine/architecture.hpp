@@ -1,0 +1,45 @@
+// The hyper-parameters of architecture `paper` (docs/design.md).
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "kernels/packets.hpp"
+#include "model_format/model_file.hpp"
+
+namespace vnreg::detail {
+
+using kernels::Index;
+
+struct Architecture {
+  std::string name;
+  Index channels_global = 0;
+  Index channels_local = 0;
+  Index channels_descriptor = 0;
+  Index channels_pair = 0;
+  Index channels_significance[2] = {0, 0};
+  Index neighbours = 0;
+  bool shared_direction = false;
+  Index fine_iterations = 0;
+  Index keep_divisor = 0;
+  double rms_radius = 0;
+  Index points = 0;
+
+  /// The fewest points a cloud must have.
+  Index min_points() const noexcept;
+};
+
+/// confidence = sigmoid(bias + overlap * overlap + residual * (rmse / inlier_distance)).
+struct Calibration {
+  double bias = 0;
+  double overlap = 0;
+  double residual = 0;
+};
+
+/// Throws Error (wrong_architecture) for an absent key, another type or a value out of range.
+Architecture read_architecture(const model_format::ModelFile& file);
+
+/// All three keys, or none.
+std::optional<Calibration> read_calibration(const model_format::ModelFile& file);
+
+}  // namespace vnreg::detail

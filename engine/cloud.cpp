@@ -1,0 +1,146 @@
+#include "engine/cloud.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "engine/counter_hash.hpp"
+
+namespace vnreg::detail {
+namespace {
+
+// Beyond it, sums and differences of a few coordinates could overflow float64.
+constexpr double largest_coordinate = 1e300;
+// Beyond it, sums of a few squares could overflow float32.
+constexpr double largest_network_coordinate = 1e15;
+// A cloud whose radius is smaller, relative to its coordinates, is one point and rounding.
+constexpr double smallest_relative_radius = 1e-12;
+// A cloud thinner than this, relative to its length, is a line and rounding: no rotation about the
+// line is determined. The network cannot tell, because its VN-ReLUs enlarge the rounding.
+constexpr double smallest_relative_thickness = 1e-5;
+
+struct Point {
+  double x, y, z;
+};
+
+template <class Scalar>
+Point read_point(const PointsView& points, std::size_t i) noexcept {
+  Scalar xyz[3];
+  std::memcpy(xyz, static_cast<const std::byte*>(points.data()) + i * points.stride_bytes(),
+              sizeof(xyz));
+  return {static_cast<double>(xyz[0]), static_cast<double>(xyz[1]), static_cast<double>(xyz[2])};
+}
+
+inline bool usable(const Point& p) noexcept {  // false for NaN, too
+  return std::abs(p.x) <= largest_coordinate && std::abs(p.y) <= largest_coordinate &&
+         std::abs(p.z) <= largest_coordinate;
+}
+
+/// The points with the smallest hashes, in the order of the input, by a heap of fixed size.
+void choose(std::size_t count, std::uint64_t seed, std::vector<Cloud::Candidate>& chosen) noexcept {
+  const std::size_t kept = chosen.size();
+  for (std::size_t i = 0; i < kept; ++i) chosen[i] = {counter_hash(seed, i), i};
+  std::make_heap(chosen.begin(), chosen.end());
+  for (std::size_t i = kept; i < count; ++i) {
+    const Cloud::Candidate candidate{counter_hash(seed, i), i};
+    if (!(candidate < chosen.front())) continue;
+    std::pop_heap(chosen.begin(), chosen.end());
+    chosen.back() = candidate;
+    std::push_heap(chosen.begin(), chosen.end());
+  }
+  std::sort(chosen.begin(), chosen.end(),
+            [](const auto& a, const auto& b) { return a.index < b.index; });
+}
+
+template <class Scalar>
+bool take_points(const PointsView& points, std::uint64_t seed, Cloud& cloud) noexcept {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!usable(read_point<Scalar>(points, i))) return false;
+  }
+  const bool all = points.size() <= static_cast<std::size_t>(cloud.max_points);
+  cloud.count = all ? static_cast<Index>(points.size()) : cloud.max_points;
+  if (!all) choose(points.size(), seed, cloud.candidates);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(cloud.count); ++i) {
+    const Point p = read_point<Scalar>(points, all ? i : cloud.candidates[i].index);
+    cloud.xyz[3 * i] = p.x;
+    cloud.xyz[3 * i + 1] = p.y;
+    cloud.xyz[3 * i + 2] = p.z;
+  }
+  return true;
+}
+
+/// Whether a covariance has a second direction.
+bool has_thickness(const Eigen::Matrix3d& covariance) noexcept {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance, Eigen::EigenvaluesOnly);
+  const Eigen::Vector3d& ascending = solver.eigenvalues();
+  return ascending(1) > smallest_relative_thickness * smallest_relative_thickness * ascending(2);
+}
+
+/// Centroid and r.m.s. radius, both relative to the bounding box, so that no sum overflows and a
+/// cloud far from the origin loses nothing. False when the points coincide or lie on a line.
+bool measure(Cloud& cloud) noexcept {
+  using Points = Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>>;
+  const Points points(cloud.xyz.data(), 3, cloud.count);
+  const Eigen::Vector3d low = points.rowwise().minCoeff();
+  const Eigen::Vector3d high = points.rowwise().maxCoeff();
+  const Eigen::Vector3d middle = low / 2 + high / 2;
+  const double half_side = (high / 2 - low / 2).maxCoeff();
+  const double magnitude = std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff());
+  if (!(half_side > smallest_relative_radius * magnitude)) return false;
+
+  const auto count = static_cast<double>(cloud.count);
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (Index i = 0; i < cloud.count; ++i) mean += (points.col(i) - middle) / half_side;
+  mean /= count;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (Index i = 0; i < cloud.count; ++i) {
+    const Eigen::Vector3d offset = (points.col(i) - middle) / half_side - mean;
+    covariance += offset * offset.transpose();
+  }
+  covariance /= count;
+  Eigen::Map<Eigen::Vector3d>(cloud.centroid) = middle + half_side * mean;
+  cloud.rms_radius = half_side * std::sqrt(covariance.trace());
+  return cloud.rms_radius > smallest_relative_radius * magnitude && has_thickness(covariance);
+}
+
+}  // namespace
+
+Cloud::Cloud(Index max)
+    : max_points(max),
+      candidates(static_cast<std::size_t>(max)),
+      xyz(static_cast<std::size_t>(3 * max)),
+      index(max) {
+  for (kernels::Floats* array : {&x, &y, &z, &offset_x, &offset_y, &offset_z, &spacing_squared}) {
+    array->resize(static_cast<std::size_t>(max));
+  }
+}
+
+Status gather(const PointsView& points, Index min_points, std::uint64_t seed,
+              Cloud& cloud) noexcept {
+  cloud.count = 0;
+  if (points.data() == nullptr || points.size() < static_cast<std::size_t>(min_points)) {
+    cloud.count = static_cast<Index>(points.data() == nullptr ? 0 : points.size());
+    return Status::too_few_points;
+  }
+  const bool finite = points.scalar() == PointsView::Scalar::float32
+                          ? take_points<float>(points, seed, cloud)
+                          : take_points<double>(points, seed, cloud);
+  if (!finite) return Status::not_finite;
+  return measure(cloud) ? Status::ok : Status::degenerate;
+}
+
+bool normalize(double scale, Cloud& cloud) noexcept {
+  float* network[3] = {cloud.x.data(), cloud.y.data(), cloud.z.data()};
+  double largest = 0;
+  for (Index i = 0; i < cloud.count; ++i) {
+    for (Index axis = 0; axis < 3; ++axis) {
+      const double value = (cloud.xyz[3 * i + axis] - cloud.centroid[axis]) / scale;
+      largest = std::max(largest, std::abs(value));
+      network[axis][i] = static_cast<float>(value);
+    }
+  }
+  return largest <= largest_network_coordinate;
+}
+
+}  // namespace vnreg::detail

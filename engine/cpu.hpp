@@ -1,0 +1,9 @@
+// Which instructions this build uses, and whether the processor has them.
+#pragma once
+
+namespace vnreg::detail {
+
+/// Throws Error (unsupported_cpu) when the processor lacks what this build was compiled for.
+void require_cpu();
+
+}  // namespace vnreg::detail

@@ -1,0 +1,216 @@
+// vnreg: the rigid pose between two point clouds of one object, from any starting pose.
+//
+//   auto result = vnreg::align(source, target);                       // one call, built-in model
+//
+//   vnreg::Model model = vnreg::Model::load("models/small.vnr");      // or Model::builtin()
+//   vnreg::Registrar registrar{model, {.threads = 1}};                // owns all working memory
+//   const vnreg::Result& result = registrar.align(source, target);    // hot path, never throws
+//
+// Conventions: target = R * source + t. Poses are 4x4, row-major, in the units of the input.
+// Thread safety: a Model is immutable and may be shared; use one Registrar per thread.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "vnreg/error.hpp"
+#include "vnreg/export.hpp"
+
+namespace vnreg {
+
+/// The version of the library, for example "0.1.0".
+VNREG_API std::string_view version() noexcept;
+/// The instruction set this build was compiled for, for example "x86-64-v3".
+VNREG_API std::string_view instruction_set() noexcept;
+
+/// A borrowed cloud: `count` points, each three consecutive floats or doubles, `stride_bytes` apart.
+class PointsView {
+ public:
+  enum class Scalar { float32, float64 };
+
+  PointsView(const float* xyz, std::size_t count, std::size_t stride_bytes = 3 * sizeof(float))
+      : data_(xyz), count_(count), stride_bytes_(stride_bytes), scalar_(Scalar::float32) {}
+  PointsView(const double* xyz, std::size_t count, std::size_t stride_bytes = 3 * sizeof(double))
+      : data_(xyz), count_(count), stride_bytes_(stride_bytes), scalar_(Scalar::float64) {}
+  PointsView(std::span<const std::array<float, 3>> points)  // NOLINT: implicit on purpose
+      : PointsView(reinterpret_cast<const float*>(points.data()), points.size()) {}
+  PointsView(std::span<const std::array<double, 3>> points)  // NOLINT: implicit on purpose
+      : PointsView(reinterpret_cast<const double*>(points.data()), points.size()) {}
+  PointsView(const std::vector<std::array<float, 3>>& points)  // NOLINT: implicit on purpose
+      : PointsView(std::span(points)) {}
+  PointsView(const std::vector<std::array<double, 3>>& points)  // NOLINT: implicit on purpose
+      : PointsView(std::span(points)) {}
+
+  const void* data() const noexcept { return data_; }
+  std::size_t size() const noexcept { return count_; }
+  std::size_t stride_bytes() const noexcept { return stride_bytes_; }
+  Scalar scalar() const noexcept { return scalar_; }
+
+ private:
+  const void* data_;
+  std::size_t count_;
+  std::size_t stride_bytes_;
+  Scalar scalar_;
+};
+
+/// Row-major 4x4 homogeneous matrix.
+using Pose = std::array<double, 16>;
+inline constexpr Pose identity_pose{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+
+enum class Mode {
+  coarse,  // the global register alone (paper, section III-C)
+  paper,   // coarse, then the fine register (paper, sections III-C and III-D)
+  verified,  // these poses and many others, proposed by pairs of points with normals, judged by how
+             // well they explain both clouds, and refined (not part of the paper)
+};
+
+enum class Status {
+  ok,              // a pose was found
+  low_confidence,  // a pose was found, but it is more likely wrong than right
+  too_few_points,  // a cloud has fewer points than the network needs: no pose
+  not_finite,      // a coordinate is NaN, infinite or beyond 1e300: no pose
+  degenerate,      // all points of a cloud coincide, or no rotation is determined: no pose
+  ambiguous,       // mode verified: a pose was found, but another fits nearly as well (a symmetry)
+};
+
+VNREG_API std::string_view to_string(Mode mode) noexcept;
+VNREG_API std::string_view to_string(Status status) noexcept;
+
+struct Options {
+  Mode mode = Mode::paper;
+  /// OpenMP threads of one align call; 0 means what OpenMP says. With 1, no parallel region opens.
+  int threads = 0;
+  /// Clouds with more points are subsampled to this many (64 to 16,384); 0 means what the model
+  /// was trained with.
+  int max_points = 0;
+  /// Seed of the subsampling. The same input, options and model give the same bits.
+  std::uint64_t seed = 0;
+  /// Keep every intermediate activation for Registrar::stages(). Allocates; for tests and tools.
+  bool record_stages = false;
+};
+
+struct StageTimes {  // milliseconds
+  double prepare = 0;  // check, subsample, normalise, neighbourhoods
+  double encode = 0;   // the SE(3)-equivariant network on both clouds
+  double coarse = 0;   // global register
+  double fine = 0;     // elimination and the iterations of the fine register
+  double hypotheses = 0;  // mode verified: normals, and poses proposed by pairs of points
+  double verify = 0;   // mode verified: comparison and refinement of the poses
+  double measure = 0;  // residual and overlap of the final pose
+  double total = 0;
+};
+
+/// A pose that fits the clouds, and how well.
+struct Alternative {
+  Pose T_target_source = identity_pose;
+  /// 0 to 1: how far each cloud's surface lies on the other's, where 1 means identical surfaces.
+  double score = 0;
+};
+
+/// Up to four alternatives, the best first.
+class Alternatives {
+ public:
+  static constexpr std::size_t capacity = 4;
+
+  std::size_t size() const noexcept { return size_; }
+  bool empty() const noexcept { return size_ == 0; }
+  const Alternative* begin() const noexcept { return items_.data(); }
+  const Alternative* end() const noexcept { return items_.data() + size_; }
+  const Alternative& operator[](std::size_t i) const noexcept { return items_[i]; }
+  /// Must not be full.
+  void push_back(const Alternative& alternative) noexcept { items_[size_++] = alternative; }
+
+ private:
+  std::array<Alternative, capacity> items_;
+  std::size_t size_ = 0;
+};
+
+struct Result {
+  Status status = Status::degenerate;
+  bool has_pose = false;                      // false: the poses below are the identity
+  Pose T_target_source = identity_pose;       // target = T * source, in the units of the input
+  Pose T_target_source_coarse = identity_pose;  // the coarse register's answer alone; the identity
+                                                // where it has none (mode verified only)
+  /// Calibrated probability that the pose is right; NaN where the model carries no calibration.
+  double confidence = std::numeric_limits<double>::quiet_NaN();
+  /// Share of points (both clouds) whose nearest point in the other cloud is within `inlier_distance`.
+  double overlap = 0;
+  double rmse = 0;             // root mean square nearest-point distance of those inliers, input units
+  double inlier_distance = 0;  // input units
+  /// Mode verified: the score of T_target_source, and the other poses that score at least 80 % of it
+  /// and differ from it and from each other by 15 degrees or 0.1 r.m.s. radii. Else NaN and none.
+  double score = std::numeric_limits<double>::quiet_NaN();
+  Alternatives alternatives;
+  std::size_t points_source = 0;  // points used, after subsampling
+  std::size_t points_target = 0;
+  StageTimes ms;
+};
+
+/// One recorded activation, row-major, as torch holds it. See docs/design.md for names and shapes.
+struct Stage {
+  std::string name;
+  std::vector<std::size_t> shape;
+  std::vector<double> values;
+};
+
+namespace detail {
+struct ModelData;
+struct RegistrarState;
+}  // namespace detail
+
+/// Weights and hyper-parameters, checked and packed. Cheap to copy (shared, immutable).
+class VNREG_API Model {
+ public:
+  /// Reads a `.vnr` file. Throws Error (file_unreadable, not_a_model, corrupt_model, ...).
+  static Model load(const std::string& path);
+  /// Reads a model from memory; `bytes` may be released afterwards. Throws like load().
+  static Model from_bytes(std::span<const std::byte> bytes);
+  /// The weights compiled into the library.
+  static Model builtin();
+
+  std::string_view name() const noexcept;
+  /// Points per cloud that the model was trained with.
+  int points() const noexcept;
+  /// The fewest points a cloud must have.
+  int min_points() const noexcept;
+
+  const detail::ModelData& data() const noexcept { return *data_; }
+
+ private:
+  explicit Model(std::shared_ptr<const detail::ModelData> data) : data_(std::move(data)) {}
+  std::shared_ptr<const detail::ModelData> data_;
+};
+
+/// Aligns pairs of clouds with one model. Owns its working memory; one per thread.
+class VNREG_API Registrar {
+ public:
+  /// Throws Error (invalid_option, unsupported_cpu).
+  explicit Registrar(Model model, Options options = {});
+  ~Registrar();
+  Registrar(Registrar&&) noexcept;
+  Registrar& operator=(Registrar&&) noexcept;
+  Registrar(const Registrar&) = delete;
+  Registrar& operator=(const Registrar&) = delete;
+
+  /// The pose that maps `source` onto `target`. Valid until the next call. Never throws: look at
+  /// `status` (any finite or non-finite input is allowed).
+  const Result& align(PointsView source, PointsView target) noexcept;
+
+  /// What the last align computed, in the order of computation; empty unless record_stages is set.
+  const std::vector<Stage>& stages() const noexcept;
+
+ private:
+  std::unique_ptr<detail::RegistrarState> state_;
+};
+
+/// One call with the built-in model. Loads the model at its first use (thread-safe).
+VNREG_API Result align(PointsView source, PointsView target, const Options& options = {});
+
+}  // namespace vnreg

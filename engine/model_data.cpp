@@ -1,0 +1,155 @@
+#include "engine/model_data.hpp"
+
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+
+namespace vnreg::detail {
+namespace {
+
+using kernels::Linear;
+using kernels::PackedMatrix;
+using kernels::RowMajorMatrix;
+using model_format::ModelFile;
+
+/// Hands out tensors by name and exact shape, and knows afterwards which were never asked for.
+class TensorSet {
+ public:
+  explicit TensorSet(const ModelFile& file) : file_(file) {}
+
+  std::span<const float> vector(const std::string& name, Index size) {
+    taken_.insert(name);
+    return file_.tensor_f32(name, {static_cast<std::size_t>(size)});
+  }
+
+  std::span<const float> matrix(const std::string& name, Index rows, Index cols) {
+    taken_.insert(name);
+    return file_.tensor_f32(name, {static_cast<std::size_t>(rows), static_cast<std::size_t>(cols)});
+  }
+
+  RowMajorMatrix dense(const std::string& name, Index rows, Index cols) {
+    return Eigen::Map<const RowMajorMatrix>(matrix(name, rows, cols).data(), rows, cols);
+  }
+
+  PackedMatrix packed(const std::string& name, Index rows, Index cols) {
+    return PackedMatrix(dense(name, rows, cols));
+  }
+
+  /// `name`.weight (out, in) and `name`.bias (out).
+  Linear linear(const std::string& name, Index out, Index in) {
+    return {dense(name + ".weight", out, in), vector(name + ".bias", out)};
+  }
+
+  void refuse_others() const {
+    for (const auto& [name, tensor] : file_.tensors()) {
+      if (!taken_.contains(name)) {
+        throw Error(ErrorCode::wrong_architecture, "tensor \"" + name + "\"",
+                    "only the tensors of architecture paper", "one more");
+      }
+    }
+  }
+
+ private:
+  const ModelFile& file_;
+  std::set<std::string> taken_;
+};
+
+/// Rows of a direction matrix: one per channel, or one for all.
+Index direction_rows(const Architecture& arch, Index channels) {
+  return arch.shared_direction ? 1 : channels;
+}
+
+kernels::VnBlockTensors read_block(TensorSet& tensors, const Architecture& arch,
+                                   const std::string& name, Index in, Index out) {
+  kernels::VnBlockTensors t;
+  t.in = in;
+  t.out = out;
+  t.shared_direction = arch.shared_direction;
+  const Index hidden = t.hidden();
+  t.relu0 = tensors.matrix(name + ".relu0", direction_rows(arch, in), in);
+  t.fc0 = tensors.matrix(name + ".fc0", hidden, in);
+  t.relu1 = tensors.matrix(name + ".relu1", direction_rows(arch, hidden), hidden);
+  t.fc1 = tensors.matrix(name + ".fc1", out, hidden);
+  if (in != out) t.shortcut = tensors.matrix(name + ".shortcut", out, in);
+  return t;
+}
+
+void read_encoder(TensorSet& tensors, ModelData& m) {
+  const Architecture& a = m.arch;
+  const Index c = a.channels_global;
+  m.network0_first =
+      kernels::make_edge_block(tensors.matrix("encoder.pre", 2 * c, 3),
+                               read_block(tensors, a, "encoder.network0.0", 2 * c, c));
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::string number = std::to_string(i);
+    m.network0_rest[i] = kernels::make_vn_block(
+        read_block(tensors, a, "encoder.network0." + std::to_string(i + 1), 2 * c, c));
+    m.network1[i] =
+        kernels::make_vn_block(read_block(tensors, a, "encoder.network1." + number, 2 * c, c));
+  }
+  m.global_direction = tensors.packed("encoder.global.relu", direction_rows(a, c), c);
+  m.global_fc = tensors.packed("encoder.global.fc", c, c);
+}
+
+void read_local_module(TensorSet& tensors, ModelData& m) {
+  const Architecture& a = m.arch;
+  const Index l = a.channels_local;
+  m.network2[0] =
+      make_vn_block(read_block(tensors, a, "local.network2.0", 2 * a.channels_global, l));
+  m.network2[1] = kernels::make_vn_block(read_block(tensors, a, "local.network2.1", 2 * l, l));
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::string name = "local.invariant." + std::to_string(i);
+    const Index in = i == 0 ? l : l / 2;
+    const Index out = in / 2;
+    m.invariant[i] =
+        kernels::make_vn_norm_layer(tensors.dense(name + ".fc", out, in),
+                                    tensors.dense(name + ".direction", direction_rows(a, out), in),
+                                    tensors.vector(name + ".scale", out),
+                                    tensors.vector(name + ".shift", out), a.shared_direction);
+  }
+  m.frame = tensors.packed("local.invariant.2.fc", 3, l / 4);
+  m.descriptor = kernels::make_descriptor_layer(
+      tensors.dense("local.descriptor.weight", a.channels_descriptor, 3 * l),
+      tensors.vector("local.descriptor.bias", a.channels_descriptor), l);
+}
+
+void read_fine_register(TensorSet& tensors, ModelData& m) {
+  const Architecture& a = m.arch;
+  const Index d = a.channels_descriptor;
+  const Index p = a.channels_pair;
+  m.significance[0] = tensors.linear("fine.significance.0", a.channels_significance[0], d);
+  m.significance[1] =
+      tensors.linear("fine.significance.1", a.channels_significance[1], a.channels_significance[0]);
+  m.significance[2] = tensors.linear("fine.significance.2", 1, a.channels_significance[1]);
+  m.weight[0] = tensors.linear("fine.weight.0", p, p);
+  m.weight[1] = tensors.linear("fine.weight.1", 1, p);
+  m.pair = kernels::make_pair_layer({
+      .descriptor = d,
+      .pair = p,
+      .weight0 = tensors.matrix("fine.pair.0.weight", p, 2 * d + 4),
+      .bias0 = tensors.vector("fine.pair.0.bias", p),
+      .weight1 = tensors.matrix("fine.pair.1.weight", p, p),
+      .bias1 = tensors.vector("fine.pair.1.bias", p),
+      .similarity_weight0 = tensors.matrix("fine.similarity.0.weight", p, p),
+      .similarity_bias0 = tensors.vector("fine.similarity.0.bias", p),
+      .similarity_weight1 = tensors.matrix("fine.similarity.1.weight", 1, p),
+      .similarity_bias1 = tensors.vector("fine.similarity.1.bias", 1),
+  });
+}
+
+}  // namespace
+
+std::shared_ptr<const ModelData> read_model_data(const ModelFile& file) {
+  auto model = std::make_shared<ModelData>();
+  model->arch = read_architecture(file);
+  model->calibration = read_calibration(file);
+  TensorSet tensors(file);
+  read_encoder(tensors, *model);
+  read_local_module(tensors, *model);
+  read_fine_register(tensors, *model);
+  tensors.refuse_others();
+  return model;
+}
+
+}  // namespace vnreg::detail

@@ -1,0 +1,44 @@
+// The weights of architecture `paper`, checked against docs/design.md and packed once.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+
+#include "engine/architecture.hpp"
+#include "kernels/invariant.hpp"
+#include "kernels/linear.hpp"
+#include "kernels/pair_features.hpp"
+#include "kernels/vn_block.hpp"
+#include "kernels/vn_linear.hpp"
+#include "model_format/model_file.hpp"
+
+namespace vnreg::detail {
+
+struct ModelData {
+  Architecture arch;
+  std::optional<Calibration> calibration;
+
+  // Encoder (paper, section III-A). The first block of network 0 includes the linear layer `pre`.
+  kernels::EdgeBlock network0_first;
+  std::array<kernels::VnBlock, 2> network0_rest;
+  std::array<kernels::VnBlock, 2> network1;
+  kernels::PackedMatrix global_direction;
+  kernels::PackedMatrix global_fc;
+
+  // Local module (paper, section III-B).
+  std::array<kernels::VnBlock, 2> network2;
+  std::array<kernels::VnNormLayer, 2> invariant;
+  kernels::PackedMatrix frame;
+  kernels::Linear descriptor;
+
+  // Fine register (paper, section III-D).
+  std::array<kernels::Linear, 3> significance;
+  kernels::PairLayer pair;
+  std::array<kernels::Linear, 2> weight;
+};
+
+/// Throws Error: wrong_architecture (hyper-parameters, tensors that do not belong), missing_tensor.
+std::shared_ptr<const ModelData> read_model_data(const model_format::ModelFile& file);
+
+}  // namespace vnreg::detail

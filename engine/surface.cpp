@@ -1,0 +1,182 @@
+#include "engine/surface.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "engine/workspace.hpp"
+
+namespace vnreg::detail {
+namespace {
+
+using kernels::Coordinates;
+using kernels::SpatialIndex;
+
+constexpr Index leaves_per_task = 8;
+constexpr Index blocks_per_task = 32;
+// Spacing below which duplicates, not the surface, would set the tolerances.
+constexpr float smallest_spacing = 0.01f;
+// Variance across the main direction, relative to that along it, of what float32 leaves of a line.
+constexpr double line_threshold = 1e-8;
+// Below it, its reciprocal leaves the range of float32.
+constexpr double smallest_radius = 1e-30;
+// The grid is exact out to where the widest comparison ends.
+constexpr float reach_in_spacings = 6.0f;
+
+/// R.m.s. distance to the centroid, in network coordinates.
+double network_radius(const Cloud& cloud) noexcept {
+  double squares = 0;
+  for (const kernels::Floats* axis : {&cloud.x, &cloud.y, &cloud.z}) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(cloud.count); ++i) {
+      const auto value = static_cast<double>((*axis)[i]);
+      squares += value * value;
+    }
+  }
+  return std::sqrt(squares / static_cast<double>(cloud.count));
+}
+
+/// Of the numbers 0 .. 2^bits - 1, that whose bits are those of v in reverse order.
+std::uint32_t reversed(std::uint32_t v, int bits) noexcept {
+  std::uint32_t r = 0;
+  for (int b = 0; b < bits; ++b) r |= ((v >> b) & 1u) << (bits - 1 - b);
+  return r;
+}
+
+/// Takes evenly from the spatial order, in bit-reversed order: every prefix is spread evenly.
+void take_points(const Cloud& cloud, float per_radius, Surface& s) noexcept {
+  const Coordinates ordered = cloud.index.ordered();
+  s.count = std::min(cloud.count, static_cast<Index>(s.x.size()));
+  const int bits = std::bit_width(static_cast<std::uint32_t>(s.count - 1));
+  Index taken = 0;
+  for (std::uint32_t v = 0; taken < s.count; ++v) {
+    const auto place = static_cast<Index>(reversed(v, bits));
+    if (place >= s.count) continue;
+    const Index from = place * cloud.count / s.count;
+    s.x[static_cast<std::size_t>(taken)] = ordered.x[from] * per_radius;
+    s.y[static_cast<std::size_t>(taken)] = ordered.y[from] * per_radius;
+    s.z[static_cast<std::size_t>(taken)] = ordered.z[from] * per_radius;
+    ++taken;
+  }
+}
+
+Eigen::Vector3d point_at(const Surface& s, std::size_t i) noexcept {
+  return Eigen::Vector3f(s.x[i], s.y[i], s.z[i]).cast<double>();
+}
+
+/// The direction in which the point's neighbours vary least.
+void fit_plane(Index i, Surface& s) noexcept {
+  const auto own = static_cast<std::size_t>(i);
+  const std::uint16_t* neighbours = s.neighbours.data() + surface_neighbours * i;
+  const Eigen::Vector3d centre = point_at(s, own);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  double farthest = 0;
+  for (Index n = 0; n < surface_neighbours; ++n) {
+    const Eigen::Vector3d offset = point_at(s, neighbours[n]) - centre;
+    sum += offset;
+    squares += offset * offset.transpose();
+    farthest = std::max(farthest, offset.squaredNorm());
+  }
+  const Eigen::Matrix3d covariance =
+      squares - sum * sum.transpose() / static_cast<double>(surface_neighbours);
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(covariance);
+  const Eigen::Vector3f normal = solver.eigenvectors().col(0).cast<float>();
+  s.normal_x[own] = normal.x();
+  s.normal_y[own] = normal.y();
+  s.normal_z[own] = normal.z();
+  s.spread_squared[own] = static_cast<float>(farthest);
+}
+
+void fit_planes(Surface& s, Index first_leaf, Index last_leaf,
+                kernels::NeighbourScratch& scratch) noexcept {
+  kernels::nearest_points(s.index, surface_neighbours, first_leaf, last_leaf, scratch,
+                          s.neighbours.data());
+  const Index last = std::min(last_leaf * SpatialIndex::leaf_size, s.count);
+  for (Index p = first_leaf * SpatialIndex::leaf_size; p < last; ++p) {
+    fit_plane(static_cast<Index>(s.index.original()[p]), s);
+  }
+}
+
+/// Lower median. Reorders the values.
+float median(float* values, Index count) noexcept {
+  float* middle = values + (count - 1) / 2;
+  std::nth_element(values, middle, values + count);
+  return *middle;
+}
+
+bool is_line(const Surface& s) noexcept {
+  const auto count = static_cast<double>(s.count);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < static_cast<std::size_t>(s.count); ++i) {
+    const Eigen::Vector3d p = point_at(s, i);
+    sum += p;
+    squares += p * p.transpose();
+  }
+  const Eigen::Matrix3d covariance = squares - sum * sum.transpose() / count;
+  const Eigen::Vector3d variances =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance, Eigen::EigenvaluesOnly)
+          .eigenvalues();
+  return !(variances(1) > line_threshold * variances(2));
+}
+
+/// Calls task(side, first, last, scratch) for every chunk of `chunk` of the total(side) parts.
+template <class Total, class Task>
+void for_each_chunk(Workspace& w, Index chunk, const Total& total, const Task& task) noexcept {
+  const Index chunks[2] = {(total(0) + chunk - 1) / chunk, (total(1) + chunk - 1) / chunk};
+  parallel_for(w.threads, chunks[0] + chunks[1], [&](Index i, int thread) {
+    const Index side = i < chunks[0] ? 0 : 1;
+    const Index first = (i - side * chunks[0]) * chunk;
+    task(side, first, std::min(first + chunk, total(side)),
+         w.scratch[static_cast<std::size_t>(thread)].neighbours);
+  });
+}
+
+}  // namespace
+
+Surface::Surface(Index max_points) : index(std::min(max_points, most_surface_points)) {
+  const auto points = static_cast<std::size_t>(std::min(max_points, most_surface_points));
+  for (kernels::Floats* array :
+       {&x, &y, &z, &normal_x, &normal_y, &normal_z, &spread_squared}) {
+    array->resize(points);
+  }
+  neighbours.resize(points * static_cast<std::size_t>(surface_neighbours));
+  grid.allocate();
+}
+
+bool build_surfaces(Workspace& w) noexcept {
+  Surface* surface = w.verified.surface;
+  w.verified.radius = std::max(network_radius(w.cloud[0]), network_radius(w.cloud[1]));
+  if (!(w.verified.radius > smallest_radius)) return false;
+  const auto per_radius = static_cast<float>(1 / w.verified.radius);
+  parallel_for(w.threads, 2, [&](Index side, int) {
+    take_points(w.cloud[side], per_radius, surface[side]);
+    surface[side].index.build(surface[side].coordinates(), surface[side].count);
+  });
+  for_each_chunk(
+      w, leaves_per_task, [&](Index side) { return surface[side].index.leaves(); },
+      [&](Index side, Index first, Index last, kernels::NeighbourScratch& scratch) {
+        fit_planes(surface[side], first, last, scratch);
+      });
+  float spacing = smallest_spacing;
+  for (Index side = 0; side < 2; ++side) {
+    Surface& s = surface[side];
+    s.spacing = std::sqrt(median(s.spread_squared.data(), s.count) /
+                          static_cast<float>(surface_neighbours));
+    if (is_line(s)) return false;
+    spacing = std::max(spacing, s.spacing);
+  }
+  w.verified.spacing = spacing;
+  const float reach = reach_in_spacings * spacing;
+  for (Index side = 0; side < 2; ++side) surface[side].grid.place(surface[side].index, reach, reach);
+  for_each_chunk(
+      w, blocks_per_task, [&](Index side) { return surface[side].grid.blocks(); },
+      [&](Index side, Index first, Index last, kernels::NeighbourScratch& scratch) {
+        surface[side].grid.fill(surface[side].index, first, last, scratch);
+      });
+  return true;
+}
+
+}  // namespace vnreg::detail

@@ -1,0 +1,45 @@
+// A cloud as mode `verified` sees it: points with normals, and fast answers to "what is nearest?".
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "engine/cloud.hpp"
+#include "kernels/nearest_grid.hpp"
+#include "kernels/neighbours.hpp"
+
+namespace vnreg::detail {
+
+struct Workspace;
+
+/// More points make a pose more exact, but not more certain: of larger clouds, this many are used.
+inline constexpr Index most_surface_points = 2048;
+/// Neighbours, the point itself included, that span a point's tangent plane. Fewer follow the
+/// noise, more round off the edges.
+inline constexpr Index surface_neighbours = 14;
+
+/// Lengths are in units of the larger r.m.s. radius of the pair. The points are in progressive
+/// order: the first n of them are spread over the cloud, for any n.
+struct Surface {
+  Index count = 0;
+  kernels::Floats x, y, z;
+  kernels::Floats normal_x, normal_y, normal_z;  // unit length, of either sign
+  std::vector<std::uint16_t> neighbours;         // surface_neighbours per point
+  kernels::Floats spread_squared;                // squared distance to the farthest of them
+  /// Distance between neighbouring points: that to the k-th neighbour over sqrt(k), median. Unlike
+  /// the distance to the nearest, it is not 0 when a cloud holds every point twice.
+  float spacing = 0;
+  kernels::SpatialIndex index;
+  kernels::NearestGrid grid;
+
+  Surface() = default;
+  explicit Surface(Index max_points);
+
+  kernels::Coordinates coordinates() const noexcept { return {x.data(), y.data(), z.data()}; }
+};
+
+/// Fills workspace.verified.surface, .radius and .spacing from both clouds. False if a cloud is a
+/// line or a point: it determines no rotation.
+bool build_surfaces(Workspace& workspace) noexcept;
+
+}  // namespace vnreg::detail

@@ -1,0 +1,182 @@
+#include "engine/verified.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "engine/hypotheses.hpp"
+#include "engine/refine.hpp"
+#include "engine/stopwatch.hpp"
+#include "engine/verify.hpp"
+
+namespace vnreg::detail {
+namespace {
+
+using kernels::RigidTransform;
+
+constexpr Index everything = most_surface_points;
+
+// Lengths below are in spacings of the sparser surface, unless they say radii.
+
+// First comparison: of this many hypotheses, those with the best probes.
+constexpr Index compared_hypotheses = 1500;
+constexpr Index compared_points = 128;
+constexpr float compared_tolerance = 1.9f;
+// Refinement of the best that differ by more than this.
+constexpr double distinct_degrees = 8;
+constexpr float distinct_radii = 0.15f;
+constexpr RefineStage first_refinements[] = {{170, 3.8f, 6, Search::cell}};
+constexpr Index second_points = 256;
+constexpr float second_tolerance = 1.4f;
+// Refinement on all points.
+constexpr double final_degrees = 3;
+constexpr float final_radii = 0.09f;
+constexpr RefineStage final_refinements[] = {{everything, 1.9f, 6, Search::cell},
+                                             {everything, 1.0f, 8, Search::exact}};
+constexpr float final_tolerance = 1.0f;
+// Poses closer than this count as one answer.
+constexpr double alternative_degrees = 15;
+constexpr float alternative_radii = 0.1f;
+// An alternative scores at least this share of the best pose's score; ambiguous is one that scores
+// more than the second share.
+constexpr double alternative_share = 0.8;
+constexpr double ambiguous_share = 0.97;
+
+float cosine_of(double degrees) noexcept {
+  return static_cast<float>(std::cos(degrees * std::numbers::pi / 180));
+}
+
+RigidTransform to_transform(const Motion& motion) noexcept {
+  RigidTransform transform;
+  transform.rotation =
+      Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(motion.rotation).cast<double>();
+  transform.translation = Eigen::Map<const Eigen::Vector3f>(motion.translation).cast<double>();
+  return transform;
+}
+
+RigidTransform in_units(const RigidTransform& t, double factor) noexcept {
+  return {t.rotation, factor * t.translation};
+}
+
+RefineStage scaled(RefineStage stage, float spacing) noexcept {
+  stage.tolerance *= spacing;
+  return stage;
+}
+
+/// Brings the hypotheses of all chunks together; leaves those with the best probes, by two-sided
+/// score. Returns their number.
+Index compare_hypotheses(Workspace& w) noexcept {
+  VerifiedWorkspace& v = w.verified;
+  Hypothesis* all = v.hypotheses.data();
+  Index count = 0;
+  for (Index chunk = 0; chunk < draw_chunks; ++chunk) {
+    const Index kept = v.kept[static_cast<std::size_t>(chunk)];
+    std::copy_n(all + chunk * kept_per_chunk, kept, all + count);
+    count += kept;
+  }
+  const auto order = [](const Hypothesis& a, const Hypothesis& b) { return better(a, b); };
+  const Index compared = std::min(count, compared_hypotheses);
+  std::nth_element(all, all + compared, all + count, order);
+  constexpr Index per_task = 16;
+  parallel_for(w.threads, (compared + per_task - 1) / per_task, [&](Index task, int) {
+    for (Index i = task * per_task; i < std::min((task + 1) * per_task, compared); ++i) {
+      all[i].score = two_sided_score(all[i].motion, v.surface, compared_points,
+                                     compared_tolerance * v.spacing, Search::cell);
+    }
+  });
+  std::sort(all, all + compared, order);
+  return compared;
+}
+
+/// Adds to the first `count` poses the best hypotheses that differ from each other.
+Index add_distinct(const Hypothesis* hypotheses, Index available, Index count,
+                   std::vector<ScoredPose>& poses) noexcept {
+  const float cosine = cosine_of(distinct_degrees);
+  Motion chosen[refined_poses];
+  Index number = 0;
+  for (Index i = 0; i < available && number < refined_poses; ++i) {
+    const Motion& motion = hypotheses[i].motion;
+    const bool known = std::any_of(chosen, chosen + number, [&](const Motion& other) {
+      return similar(motion, other, cosine, distinct_radii);
+    });
+    if (known) continue;
+    chosen[number++] = motion;
+    poses[static_cast<std::size_t>(count++)] = {to_transform(motion), 0};
+  }
+  return count;
+}
+
+/// Sorts by score and drops poses that are similar to a better one, and those beyond `most`.
+Index keep_distinct(ScoredPose* poses, Index count, Index most, double degrees,
+                    float radii) noexcept {
+  const float cosine = cosine_of(degrees);
+  std::sort(poses, poses + count,
+                   [](const ScoredPose& a, const ScoredPose& b) { return a.score > b.score; });
+  Index kept = 0;
+  for (Index i = 0; i < count && kept < most; ++i) {
+    const Motion motion = to_motion(poses[i].transform);
+    const bool known = std::any_of(poses, poses + kept, [&](const ScoredPose& other) {
+      return similar(motion, to_motion(other.transform), cosine, radii);
+    });
+    if (!known) poses[kept++] = poses[i];
+  }
+  return kept;
+}
+
+/// Takes the refined pose unless it explains less: the part of a surface that the other one lacks
+/// may pull a pose that is right off its place.
+void refine_if_better(std::span<const RefineStage> stages, Index points, float tolerance,
+                      Search search, const VerifiedWorkspace& v, ScoredPose& pose) noexcept {
+  const auto score_of = [&](const RigidTransform& transform) {
+    return two_sided_score(to_motion(transform), v.surface, points, tolerance * v.spacing, search);
+  };
+  RigidTransform refined = pose.transform;
+  for (const RefineStage& stage : stages) {
+    refined = refine(refined, v.surface, scaled(stage, v.spacing));
+  }
+  const float before = score_of(pose.transform);
+  const float after = score_of(refined);
+  if (!(after < before)) pose.transform = refined;
+  pose.score = std::max(before, after);
+}
+
+}  // namespace
+
+VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::uint64_t seed,
+                                Workspace& w, StageTimes& times) noexcept {
+  VerifiedWorkspace& v = w.verified;
+  Stopwatch watch;
+  VerifiedPoses result;
+  if (!build_surfaces(w)) return result;
+  propose_poses(seed, w);
+  times.hypotheses = watch.lap();
+
+  ScoredPose* poses = v.poses.data();
+  Index count = 0;
+  for (const RigidTransform& pose : proposals) {
+    poses[count++] = {in_units(pose, 1 / v.radius), 0};
+  }
+  const Index compared = compare_hypotheses(w);
+  count = add_distinct(v.hypotheses.data(), compared, count, v.poses);
+  parallel_for(w.threads, count, [&](Index i, int) { 
+    refine_if_better(first_refinements, second_points, second_tolerance, Search::cell, v, poses[i]);
+   });
+  count = keep_distinct(poses, count, final_poses, final_degrees, final_radii);
+  parallel_for(w.threads, count, [&](Index i, int) { 
+    refine_if_better(final_refinements, everything, final_tolerance, Search::exact, v, poses[i]);
+   });
+  count = keep_distinct(poses, count, VerifiedPoses::capacity, alternative_degrees,
+                        alternative_radii);
+  for (Index i = 0; i < count; ++i) {
+    if (poses[i].score < alternative_share * poses[0].score) break;
+    result.pose[result.count++] = {in_units(poses[i].transform, v.radius), poses[i].score};
+  }
+  times.verify = watch.lap();
+  return result;
+}
+
+bool ambiguous(const VerifiedPoses& poses) noexcept {
+  return poses.count > 1 && poses.pose[1].score > ambiguous_share * poses.pose[0].score;
+}
+
+}  // namespace vnreg::detail

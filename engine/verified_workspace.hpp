@@ -1,0 +1,65 @@
+// The working memory of mode `verified`, sized once.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "engine/motion.hpp"
+#include "engine/surface.hpp"
+
+namespace vnreg::detail {
+
+/// Target points whose pairs go into the table.
+inline constexpr Index table_points = 400;
+/// Source pairs are drawn in chunks, each of which keeps its best hypotheses. The chunks are the
+/// same for any number of threads.
+inline constexpr Index draw_chunks = 32;
+inline constexpr Index draws_per_chunk = 16;
+inline constexpr Index kept_per_chunk = 64;
+/// Poses that other registers may add to the hypotheses.
+inline constexpr Index most_proposals = 2;
+/// Distinct hypotheses that are refined.
+inline constexpr Index refined_poses = 64;
+/// Distinct poses that are refined on all points.
+inline constexpr Index final_poses = 12;
+
+/// Ordered pairs of target points, grouped by key.
+struct PairTable {
+  struct Pair {
+    std::uint16_t first, second;
+  };
+  Index points = 0;
+  std::vector<std::uint16_t> keys;   // of all ordered pairs
+  std::vector<std::uint32_t> start;  // of each key's pairs, and the end of the last one's
+  std::vector<Pair> pairs;
+};
+
+struct Hypothesis {
+  Motion motion;
+  float score;
+  std::uint32_t ordinal;  // of its making: what ties are broken by
+
+  friend bool better(const Hypothesis& a, const Hypothesis& b) noexcept {
+    return a.score != b.score ? a.score > b.score : a.ordinal < b.ordinal;
+  }
+};
+
+struct ScoredPose {
+  kernels::RigidTransform transform;
+  double score = 0;
+};
+
+struct VerifiedWorkspace {
+  Surface surface[2];
+  double radius = 1;  // the unit of length of the surfaces, in network coordinates
+  float spacing = 0;  // of the sparser surface, in that unit
+  PairTable table;
+  std::vector<Hypothesis> hypotheses;  // kept_per_chunk of each chunk
+  std::vector<Index> kept;             // how many of them each chunk has found
+  std::vector<ScoredPose> poses;       // what is refined
+
+  VerifiedWorkspace() = default;
+  explicit VerifiedWorkspace(Index max_points);
+};
+
+}  // namespace vnreg::detail

@@ -1,0 +1,42 @@
+// How well a pose explains both surfaces, and the matches that it is judged by.
+#pragma once
+
+#include "engine/motion.hpp"
+#include "engine/surface.hpp"
+
+namespace vnreg::detail {
+
+enum class Search {
+  cell,   // the point of the grid's cell: at most a cell's diagonal farther than the nearest
+  exact,  // from there to the nearest of its neighbours, as long as that is nearer
+};
+
+/// Up to 64 moved points of one surface and their nearest points on the other.
+struct Matches {
+  static constexpr Index capacity = 64;
+  Index count;
+  alignas(64) float x[capacity], y[capacity], z[capacity];  // moved
+  alignas(64) float nearest_x[capacity], nearest_y[capacity], nearest_z[capacity];
+  alignas(64) float normal_x[capacity], normal_y[capacity], normal_z[capacity];  // at the nearest
+  alignas(64) float squared[capacity];    // distance
+  /// 1 where the normals agree, 0 from 60 degrees on.
+  alignas(64) float agreement[capacity];
+};
+
+/// The matches of points first .. first + count - 1 (at most 64) of `moving`.
+void match_points(const Motion& motion, const Surface& moving, Index first, Index count,
+                  const Surface& fixed, Search search, Matches& matches) noexcept;
+
+/// The mean over the first `points` points of each surface (fewer if it has fewer), both ways, of
+/// agreement x (k(d / 3 tolerance) + k(d / 0.3 tolerance)) / 2, where d is the distance of the match
+/// and k(u) = (1 - u^2)^2, 0 from u = 1 on; 1 for identical surfaces. Both ways, since a pose that
+/// folds one surface into a part of the other explains only one of them.
+float two_sided_score(const Motion& motion, const Surface surface[2], Index points, float tolerance,
+                      Search search) noexcept;
+
+/// Up to `probe_points` points of the source: the sum of (1 - squared distance / tolerance^2), 0
+/// beyond. Gives up, and returns 0, when the first points promise nothing.
+inline constexpr Index probe_points = 40;
+float probe(const Motion& motion, const Surface surface[2], float tolerance) noexcept;
+
+}  // namespace vnreg::detail

@@ -1,0 +1,71 @@
+#include "python/errors.hpp"
+
+#include <nanobind/stl/string.h>
+
+#include <exception>
+#include <string>
+
+#include "vnreg/error.hpp"
+
+namespace nb = nanobind;
+
+namespace vnreg::python {
+namespace {
+
+const char* name_of(ErrorCode code) noexcept {
+  switch (code) {
+    case ErrorCode::file_unreadable:
+      return "file_unreadable";
+    case ErrorCode::not_a_model:
+      return "not_a_model";
+    case ErrorCode::unsupported_version:
+      return "unsupported_version";
+    case ErrorCode::corrupt_model:
+      return "corrupt_model";
+    case ErrorCode::wrong_architecture:
+      return "wrong_architecture";
+    case ErrorCode::missing_tensor:
+      return "missing_tensor";
+    case ErrorCode::invalid_option:
+      return "invalid_option";
+    case ErrorCode::unsupported_cpu:
+      return "unsupported_cpu";
+  }
+  return "unknown";
+}
+
+void raise(const Error& error, nb::handle type) {
+  nb::object instance = type(error.what());
+  instance.attr("code") = name_of(error.code());
+  instance.attr("field") = error.field();
+  instance.attr("expected") = error.expected();
+  instance.attr("got") = error.got();
+  PyErr_SetObject(type.ptr(), instance.ptr());
+}
+
+void translate(const std::exception_ptr& exception, void* type) {
+  try {
+    std::rethrow_exception(exception);
+  } catch (const Error& error) {
+    raise(error, nb::handle(static_cast<PyObject*>(type)));
+  }
+}
+
+constexpr const char* documentation =
+    "A model that cannot be loaded or an option out of its range.\n\n"
+    "code: 'file_unreadable', 'not_a_model', 'unsupported_version', 'corrupt_model',\n"
+    "'wrong_architecture', 'missing_tensor', 'invalid_option' or 'unsupported_cpu'.\n"
+    "field, expected, got: where it is wrong, and both values (str).";
+
+}  // namespace
+
+void bind_error(nb::module_& module) {
+  nb::object type = nb::steal(
+      PyErr_NewExceptionWithDoc("vnreg.Error", documentation, PyExc_RuntimeError, nullptr));
+  if (!type.is_valid()) throw nb::python_error();
+  module.attr("Error") = type;
+  // The translator outlives the module: it keeps a reference of its own.
+  nb::register_exception_translator(translate, type.release().ptr());
+}
+
+}  // namespace vnreg::python

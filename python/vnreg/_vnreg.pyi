@@ -1,0 +1,93 @@
+import os
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_Mode = Literal["coarse", "paper", "verified"]
+_Status = Literal[
+    "ok", "low_confidence", "ambiguous", "too_few_points", "not_finite", "degenerate"
+]
+
+__version__: str
+
+def instruction_set() -> str: ...
+
+class Error(RuntimeError):
+    code: str
+    field: str
+    expected: str
+    got: str
+
+class Model:
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> Model: ...
+    @staticmethod
+    def from_bytes(content: bytes) -> Model: ...
+    @staticmethod
+    def builtin() -> Model: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def points(self) -> int: ...
+    @property
+    def min_points(self) -> int: ...
+
+class Alternative:
+    @property
+    def T_target_source(self) -> NDArray[np.float64]: ...
+    @property
+    def score(self) -> float: ...
+
+class Result:
+    @property
+    def status(self) -> _Status: ...
+    @property
+    def has_pose(self) -> bool: ...
+    @property
+    def T_target_source(self) -> NDArray[np.float64]: ...
+    @property
+    def T_target_source_coarse(self) -> NDArray[np.float64]: ...
+    @property
+    def confidence(self) -> float: ...
+    @property
+    def overlap(self) -> float: ...
+    @property
+    def rmse(self) -> float: ...
+    @property
+    def inlier_distance(self) -> float: ...
+    @property
+    def score(self) -> float: ...
+    @property
+    def alternatives(self) -> list[Alternative]: ...
+    @property
+    def points_source(self) -> int: ...
+    @property
+    def points_target(self) -> int: ...
+    @property
+    def ms(self) -> dict[str, float]: ...
+
+class Registrar:
+    def __init__(
+        self,
+        model: Model | None = None,
+        *,
+        mode: _Mode = "paper",
+        threads: int = 1,
+        max_points: int = 0,
+        seed: int = 0,
+        record_stages: bool = False,
+    ) -> None: ...
+    def align(self, source: ArrayLike, target: ArrayLike) -> Result: ...
+    def stages(self) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]: ...
+
+def align(
+    source: ArrayLike,
+    target: ArrayLike,
+    *,
+    model: Model | None = None,
+    mode: _Mode = "paper",
+    threads: int = 1,
+    max_points: int = 0,
+    seed: int = 0,
+) -> Result: ...

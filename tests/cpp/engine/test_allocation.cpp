@@ -1,0 +1,95 @@
+// After its construction a registrar allocates nothing. All ways to the heap are counted: malloc
+// and its kin are replaced here, below operator new and Eigen.
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <cerrno>
+#include <cstdlib>
+
+#include "clouds.hpp"
+#include "random_model.hpp"
+
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* old, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+}
+
+namespace {
+
+std::atomic<long> allocations{0};
+
+}  // namespace
+
+extern "C" {
+void* malloc(std::size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t count, std::size_t size) {
+  ++allocations;
+  return __libc_calloc(count, size);
+}
+void* realloc(void* old, std::size_t size) {
+  ++allocations;
+  return __libc_realloc(old, size);
+}
+void* memalign(std::size_t alignment, std::size_t size) {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) { return memalign(alignment, size); }
+int posix_memalign(void** out, std::size_t alignment, std::size_t size) {
+  *out = memalign(alignment, size);
+  return *out == nullptr ? ENOMEM : 0;
+}
+}
+
+namespace vnreg::test {
+namespace {
+
+TEST_CASE("the counter counts") {
+  const long before = allocations;
+  const auto number = std::make_unique<int>(1);
+  const Eigen::VectorXf vector(1000);
+  REQUIRE(*number == 1);
+  REQUIRE(vector.size() == 1000);
+  const long after = allocations;
+  REQUIRE(after >= before + 2);
+}
+
+TEST_CASE("align allocates nothing, with any input and any number of threads") {
+  Random random(81);
+  const Points source = shape(1000, random);
+  const Points target = moved(shape(900, random), random_motion(random, 1));
+  const Points many = shape(20000, random);
+  const Points few = shape(24, random);
+  const Points equal(100, {1, 2, 3});
+  const Points none;
+  for (const Widths& widths : {Widths{}, Widths{.global = 128, .local = 64},
+                               Widths{.global = 48, .local = 48, .shared_direction = true}}) {
+    const Model model = random_model(widths).build();
+    for (const Mode mode : {Mode::coarse, Mode::paper}) {
+      for (const int threads : {1, 2, 3}) {
+        Registrar registrar(model, {.mode = mode, .threads = threads});
+        const long before = allocations;
+        Status statuses[] = {
+            registrar.align(source, target).status, registrar.align(many, target).status,
+            registrar.align(few, many).status,      registrar.align(equal, source).status,
+            registrar.align(none, source).status,   registrar.align(source, target).status,
+        };
+        const long after = allocations;
+        CAPTURE(widths.global, to_string(mode), threads);
+        REQUIRE(after == before);
+        REQUIRE(statuses[0] == Status::ok);
+        REQUIRE(statuses[1] == Status::ok);
+        REQUIRE(statuses[2] == Status::ok);
+        REQUIRE(statuses[3] == Status::degenerate);
+        REQUIRE(statuses[4] == Status::too_few_points);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace vnreg::test
