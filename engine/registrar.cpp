@@ -142,7 +142,8 @@ Status run(const ModelData& model, const Options& options, const PointsView clou
   result.overlap = residual.overlap;
   result.rmse = residual.rmse * scale;
   result.inlier_distance = residual.inlier_distance * scale;
-  result.confidence = confidence(model, residual);
+  // The calibration was fitted on the paper's pipeline; it says nothing about verified poses.
+  if (options.mode != Mode::verified) result.confidence = confidence(model, residual);
   result.ms.measure = watch.lap();
   if (result.confidence < 0.5) return Status::low_confidence;
   return unclear ? Status::ambiguous : Status::ok;

@@ -138,7 +138,8 @@ struct Result {
   Pose T_target_source = identity_pose;       // target = T * source, in the units of the input
   Pose T_target_source_coarse = identity_pose;  // the coarse register's answer alone; the identity
                                                 // where it has none (mode verified only)
-  /// Calibrated probability that the pose is right; NaN where the model carries no calibration.
+  /// Calibrated probability that the pose is right; NaN where the model carries no
+  /// calibration, and in mode verified, which the calibration was not fitted on.
   double confidence = std::numeric_limits<double>::quiet_NaN();
   /// Share of points (both clouds) whose nearest point in the other cloud is within `inlier_distance`.
   double overlap = 0;
