@@ -21,7 +21,6 @@ class NetworkConfig:
     keep_divisor: int = 6  # hard elimination keeps N // keep_divisor points
     input_rms_radius: float = 0.0  # common r.m.s. radius of the input; 0 = coordinates as given
     decoder_width: int = 256
-    decoder_centred: bool = True  # queries about the centroid; the authors' code leaves them as is
     # Ablations of the paper's Table V. The engine runs the full network only.
     vector_neurons: bool = True
     invariant_layer: bool = True
