@@ -3,61 +3,101 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 from parity_pairs import (
+    Points,
+    TestPair,
     make_test_pair,
     rotation_difference_deg,
     same_choices,
     worst_determination,
 )
-from parity_twin import REPORTS, Twin
+from parity_twin import REPORTS, Stages, Twin
+
+Program = Callable[[Points, Points], Stages]
 
 SIZES = (64, 333, 768, 1024)
 MAX_ROTATION_DEG = 0.01
-MAX_SHARE = 0.01
 # Below it the matches lie on a line or collapse, and rounding turns the fitted rotation at will.
 DETERMINED = 1e-3
 
 
-def compare(model: Twin, pairs: int) -> dict[str, Any]:
-    """Clean and noisy pairs of all sizes in turn."""
-    differing = undetermined = 0
+def make_pairs(count: int, noisy: bool) -> Iterator[TestPair]:
+    """Pairs of all sizes in turn, every other block of four with unequal sizes."""
+    for seed in range(count):
+        size = SIZES[seed % 4]
+        other = SIZES[(seed // 8 + 1) % 4] if seed % 8 >= 4 else size
+        yield make_test_pair(1000 + seed, size, other, noisy)
+
+
+def compare(a: Program, b: Program, pairs: Iterable[TestPair]) -> dict[str, Any]:
+    """How often two programs choose otherwise, and how far their poses are apart if they do not."""
+    different = undetermined = 0
     rotations: list[float] = []
-    for seed in range(pairs):
-        size = SIZES[seed % len(SIZES)]
-        other = SIZES[(seed // 8) % len(SIZES)] if seed % 16 >= 8 else size
-        pair = make_test_pair(1000 + seed, size, other, noisy=seed % 8 >= 4)
-        engine = model.engine(pair.source, pair.target)
-        torch32 = model.reference(pair.source, pair.target)
-        if not same_choices(engine, torch32):
-            differing += 1
-        elif worst_determination(engine) < DETERMINED:
+    for pair in pairs:
+        x, y = a(pair.source, pair.target), b(pair.source, pair.target)
+        if not same_choices(x, y):
+            different += 1
+        elif worst_determination(x) < DETERMINED:
             undetermined += 1
         else:
-            rotations.append(
-                rotation_difference_deg(engine["T_target_source"], torch32["T_target_source"])
-            )
+            poses = (x["T_target_source"], y["T_target_source"])
+            rotations.append(rotation_difference_deg(*poses))
+    total = different + undetermined + len(rotations)
     return {
-        "pairs": pairs,
-        "pairs_with_differing_choices": differing,
-        "share": differing / pairs,
+        "pairs": total,
+        "pairs_with_different_choices": different,
+        "share": different / total,
         "pairs_with_undetermined_rotation": undetermined,
         "pairs_compared": len(rotations),
         "largest_rotation_difference_deg": max(rotations),
     }
 
 
-@pytest.mark.parametrize(("name", "pairs"), [("shipped", 320), ("paper", 64)])
-def test_poses_agree_wherever_the_choices_do(
-    name: str, pairs: int, twin: Callable[[str], Twin]
-) -> None:
-    figures = compare(twin(name), pairs)
+def report(model: str, figures: dict[str, Any]) -> None:
+    """Adds to build/reports/parity.json."""
     REPORTS.mkdir(parents=True, exist_ok=True)
     path = REPORTS / "parity.json"
-    report = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    path.write_text(json.dumps(report | {name: figures}, indent=1) + "\n", encoding="utf-8")
+    known = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    known[model] = known.get(model, {}) | figures
+    path.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+
+
+@pytest.mark.parametrize(("name", "count"), [("shipped", 128), ("paper", 32)])
+def test_noisy_pairs_have_the_poses_and_the_choices_of_torch(
+    name: str, count: int, twin: Callable[[str], Twin]
+) -> None:
+    model = twin(name)
+    figures = compare(model.engine, model.reference, make_pairs(count, noisy=True))
+    torch_alone = compare(model.reference, model.exact, make_pairs(count, noisy=True))
+    figures["share_torch_float32_against_float64"] = torch_alone["share"]
+    report(name, {"noisy": figures})
     assert figures["largest_rotation_difference_deg"] <= MAX_ROTATION_DEG
-    assert figures["share"] < MAX_SHARE
+    # Near ties of significances, similarities and weights: rounding decides, in torch as well.
+    spread = np.sqrt(max(torch_alone["share"], 0.05) / count)  # of a share, at most
+    assert figures["share"] <= torch_alone["share"] + 3 * spread
+    assert figures["pairs_with_undetermined_rotation"] <= 0.05 * count
+
+
+@pytest.mark.parametrize(("name", "count"), [("shipped", 64), ("paper", 16)])
+def test_clean_pairs_choose_as_alike_as_torch_and_torch(
+    name: str, count: int, twin: Callable[[str], Twin]
+) -> None:
+    """Under the true pose of a clean pair every kept point coincides with its match.
+
+    The direction between the two, which is a feature of the pair (paper, section III-D), is then
+    the rounding error of a zero vector, scaled to length 1. Torch in float32 and torch in float64
+    choose differently for that reason, and so does the engine: about as often, not more.
+    """
+    model = twin(name)
+    figures = compare(model.engine, model.reference, make_pairs(count, noisy=False))
+    torch_alone = compare(model.reference, model.exact, make_pairs(count, noisy=False))
+    figures["share_torch_float32_against_float64"] = torch_alone["share"]
+    report(name, {"clean": figures})
+    assert figures["largest_rotation_difference_deg"] <= MAX_ROTATION_DEG
+    spread = np.sqrt(max(torch_alone["share"], 0.05) / count)  # of a share, at most
+    assert figures["share"] <= torch_alone["share"] + 3 * spread
