@@ -5,9 +5,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _Mode = Literal["coarse", "paper", "verified"]
-_Status = Literal[
-    "ok", "low_confidence", "ambiguous", "too_few_points", "not_finite", "degenerate"
-]
+_Status = Literal["ok", "low_confidence", "ambiguous", "too_few_points", "not_finite", "degenerate"]
 
 __version__: str
 

@@ -14,6 +14,9 @@ from scipy.spatial.transform import Rotation
 Stages = Mapping[str, NDArray[np.generic]]
 Points = NDArray[np.float64]
 COINCIDENT = 1e-3  # below this distance float32 knows no direction between two points
+# Below it matched points lie on a line or collapse, and rounding turns the fitted rotation at will.
+UNDETERMINED = 1e-3
+SIDES = ("source", "target")
 
 
 @dataclass(frozen=True)
@@ -100,17 +103,6 @@ def by_index(stages: Stages) -> dict[str, NDArray[np.generic]]:
     return ordered
 
 
-def same_choices(a: Stages, b: Stages) -> bool:
-    """Whether the discrete choices agree: kept points, matches, and which weights are zero."""
-    x, y = by_index(a), by_index(b)
-    names = ["source.kept", "target.kept"]
-    names += [f"fine.{index}.match" for index in range(iterations(a))]
-    if not all(np.array_equal(x[name], y[name]) for name in names):
-        return False
-    weights = [f"fine.{index}.weight" for index in range(iterations(a))]
-    return all(np.array_equal(x[name] == 0, y[name] == 0) for name in weights)
-
-
 def kept_points(stages: Stages, index: int) -> tuple[Points, Points]:
     """Kept points before iteration `index`: the source moved by the pose so far, and the target."""
     pose = stages["coarse.T" if index == 0 else f"fine.{index - 1}.T"].astype(float)
@@ -145,6 +137,26 @@ def determination(stages: Stages, index: int) -> float:
     return float((s[1] + np.sign(np.linalg.det(u @ vt)) * s[2]) / s[0]) if s[0] > 0 else 0.0
 
 
-def worst_determination(stages: Stages) -> float:
-    """Over all iterations; 1 without any."""
-    return min((determination(stages, i) for i in range(iterations(stages))), default=1.0)
+def same_choices(a: Stages, b: Stages) -> bool:
+    """Whether the discrete choices agree: kept points, matches, and which weights are zero.
+
+    Up to the first iteration whose matches do not determine a rotation: what follows it starts from
+    an arbitrary pose.
+    """
+    x, y = by_index(a), by_index(b)
+    if not all(np.array_equal(x[f"{side}.kept"], y[f"{side}.kept"]) for side in SIDES):
+        return False
+    for index in range(iterations(a)):
+        match, weight = f"fine.{index}.match", f"fine.{index}.weight"
+        if not np.array_equal(x[match], y[match]):
+            return False
+        if not np.array_equal(x[weight] == 0, y[weight] == 0):
+            return False
+        if determination(a, index) < UNDETERMINED:
+            return True
+    return True
+
+
+def determined(stages: Stages) -> bool:
+    """Whether the matches of every iteration determine its rotation."""
+    return all(determination(stages, i) >= UNDETERMINED for i in range(iterations(stages)))

@@ -11,10 +11,10 @@ import pytest
 from parity_pairs import (
     Points,
     TestPair,
+    determined,
     make_test_pair,
     rotation_difference_deg,
     same_choices,
-    worst_determination,
 )
 from parity_twin import REPORTS, Stages, Twin
 
@@ -22,8 +22,6 @@ Program = Callable[[Points, Points], Stages]
 
 SIZES = (64, 333, 768, 1024)
 MAX_ROTATION_DEG = 0.01
-# Below it the matches lie on a line or collapse, and rounding turns the fitted rotation at will.
-DETERMINED = 1e-3
 
 
 def make_pairs(count: int, noisy: bool) -> Iterator[TestPair]:
@@ -42,7 +40,7 @@ def compare(a: Program, b: Program, pairs: Iterable[TestPair]) -> dict[str, Any]
         x, y = a(pair.source, pair.target), b(pair.source, pair.target)
         if not same_choices(x, y):
             different += 1
-        elif worst_determination(x) < DETERMINED:
+        elif not determined(x):
             undetermined += 1
         else:
             poses = (x["T_target_source"], y["T_target_source"])

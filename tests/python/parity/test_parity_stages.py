@@ -14,13 +14,13 @@ from parity_pairs import (
     by_index,
     covariance,
     determination,
+    determined,
     iterations,
     kept_distances,
     kept_points,
     normalised_error,
     rotation_difference_deg,
     same_choices,
-    worst_determination,
 )
 from parity_run import Run
 from parity_twin import CONFIGS, REPORTS
@@ -152,7 +152,7 @@ def test_whole_pipeline_is_as_exact_as_torch(
     assert set(pair.engine) == set(pair.torch32)
     programs = (pair.engine, pair.torch32, pair.torch64)
     assert not too_large(real_stages(pair.engine), programs, name, figures)
-    if same_choices(pair.engine, pair.torch32) and worst_determination(pair.engine) > DETERMINED:
+    if same_choices(pair.engine, pair.torch32) and determined(pair.engine):
         poses = (pair.engine["T_target_source"], pair.torch32["T_target_source"])
         assert rotation_difference_deg(*poses) <= 0.01
 
@@ -193,13 +193,11 @@ def test_fine_stages_agree_where_the_choices_do(
     else:
         pytest.fail("the choices of the engine and torch differ for eight pairs in a row")
     ordered = [by_index(stages) for stages in programs]
-    determined = 0  # iterations before one whose rotation is not determined
-    while (
-        determined < iterations(pair.engine) and determination(pair.engine, determined) > DETERMINED
-    ):
-        determined += 1
-    apart = by_index_distances(pair.engine, determined)
-    stages = [n for n in ordered[0] if n.startswith("fine.") and int(n.split(".")[1]) < determined]
+    steps = 0  # iterations before one whose rotation is not well determined
+    while steps < iterations(pair.engine) and determination(pair.engine, steps) > DETERMINED:
+        steps += 1
+    apart = by_index_distances(pair.engine, steps)
+    stages = [n for n in ordered[0] if n.startswith("fine.") and int(n.split(".")[1]) < steps]
     for stage in stages:
         if stage.endswith("similarity"):
             for program in ordered:
