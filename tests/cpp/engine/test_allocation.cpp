@@ -91,31 +91,5 @@ TEST_CASE("align allocates nothing, with any input and any number of threads") {
   }
 }
 
-TEST_CASE("mode verified allocates nothing either") {
-  Random random(82);
-  const Points source = shape(1000, random);
-  const Points target = moved(shape(900, random), random_motion(random, 1));
-  const Points many = shape(5000, random);
-  const Points few = shape(24, random);
-  const Points equal(100, {1, 2, 3});
-  for (const std::uint64_t fine_iterations : {0u, 3u}) {
-    const Model model = random_model({.fine_iterations = fine_iterations}).build();
-    for (const int threads : {1, 2, 3}) {
-      Registrar registrar(model, {.mode = Mode::verified, .threads = threads, .max_points = 3000});
-      const long before = allocations;
-      const bool poses[] = {
-          registrar.align(source, target).has_pose, registrar.align(many, target).has_pose,
-          registrar.align(few, many).has_pose, registrar.align(equal, source).has_pose};
-      const long after = allocations;
-      CAPTURE(fine_iterations, threads);
-      REQUIRE(after == before);
-      REQUIRE(poses[0]);
-      REQUIRE(poses[1]);
-      REQUIRE(poses[2]);
-      REQUIRE(!poses[3]);
-    }
-  }
-}
-
 }  // namespace
 }  // namespace vnreg::test

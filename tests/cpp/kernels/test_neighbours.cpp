@@ -126,33 +126,6 @@ TEST_CASE("k nearest neighbours equal the full sort, ties by lower index") {
   }
 }
 
-TEST_CASE("the list of the k nearest points equals the full sort, ties by lower index") {
-  Random random(66);
-  for (const Index count : {1, 15, 16, 17, 65, 333}) {
-    for (const Index k : {1, 2, 14, 64}) {
-      if (k > count) continue;
-      for (const PointSet& points : {gaussian(count, random), lattice(count, random),
-                                     all_equal(count), clusters(count, random)}) {
-        SpatialIndex index(count);
-        index.build(points.coordinates(), count);
-        NeighbourScratch scratch(count);
-        std::vector<std::uint16_t> neighbours(static_cast<std::size_t>(count * k + 1), 0xbeef);
-        nearest_points(index, k, 0, index.leaves(), scratch, neighbours.data());
-        REQUIRE(neighbours.back() == 0xbeef);
-        for (Index i = 0; i < count; ++i) {
-          const auto own = neighbours.begin() + i * k;
-          std::sort(own, own + k);
-          std::vector<Index> expected = reference::by_distance(points.coordinates(), count, i);
-          expected.resize(static_cast<std::size_t>(k));
-          std::sort(expected.begin(), expected.end());
-          CAPTURE(count, k, i);
-          REQUIRE(std::equal(expected.begin(), expected.end(), own));
-        }
-      }
-    }
-  }
-}
-
 TEST_CASE("squares at the ends of float32's range do not lose neighbours") {
   Random random(62);
   for (const float scale : {1e15f, 1e-15f, 1e-19f, 1e-21f, 1e-23f, 1e-38f, 1e-45f}) {
