@@ -24,9 +24,19 @@ Index read_index(const ModelFile& file, std::string_view key, std::uint64_t min,
 std::string read_name(const ModelFile& file) {
   std::string name = file.get_string("name");
   if (name.empty() || name.size() > 64) {
-    refuse("name", "1 to 64 characters", std::to_string(name.size()));
+    refuse("name", "1 to 64 bytes", std::to_string(name.size()));
   }
   return name;
+}
+
+/// Free text, but text, and of bounded length.
+void check_provenance(const ModelFile& file) {
+  for (const auto& [key, value] : file.metadata()) {
+    if (!key.starts_with("provenance.")) continue;
+    if (const std::size_t size = file.get_string(key).size(); size > 4096) {
+      refuse(key, "up to 4096 bytes", std::to_string(size));
+    }
+  }
 }
 
 double read_rms_radius(const ModelFile& file) {
@@ -49,6 +59,7 @@ Architecture read_architecture(const ModelFile& file) {
   }
   Architecture a;
   a.name = read_name(file);
+  check_provenance(file);
   a.channels_global = read_index(file, "channels.global", 4, max_channels);
   a.channels_local = read_index(file, "channels.local", 4, max_channels);
   if (a.channels_local % 4 != 0) {

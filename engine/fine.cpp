@@ -64,7 +64,11 @@ void weigh_matches(const ModelData& model, FineBuffers& fine) noexcept {
   kernels::linear(model.weight[1], fine.weight_hidden.data(), hidden_rows, count,
                   fine.weight_rows.data());
   float* weights = fine.weights.data();
-  for (Index i = 0; i < count; ++i) weights[i] = kernels::sigmoid(fine.weight_rows[i * out_rows]);
+  for (Index i = 0; i < count; ++i) {
+    const float weight = kernels::sigmoid(fine.weight_rows[i * out_rows]);
+    weights[i] =
+        weight >= 0.0f ? weight : 0.0f;  // NaN, where the network overflows, weighs nothing
+  }
   float* sorted = fine.sorted_weights.data();
   std::copy_n(weights, count, sorted);
   std::nth_element(sorted, sorted + (count - 1) / 2, sorted + count);

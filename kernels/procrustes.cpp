@@ -39,6 +39,7 @@ ProcrustesSolution procrustes(const Coordinates& x, const Coordinates& y, const 
     h +=
         weight_at(weights, i) * (vector_at(y, i) - mean_y) * (vector_at(x, i) - mean_x).transpose();
   }
+  if (!h.allFinite() || !mean_x.allFinite() || !mean_y.allFinite()) return {};
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(h, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d u = svd.matrixU();
   if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1.0;

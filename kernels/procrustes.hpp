@@ -24,8 +24,8 @@ struct ProcrustesSolution {
   Eigen::Vector3d singular_values = Eigen::Vector3d::Zero();  // of H, descending
 };
 
-/// `weights` (non-negative) may be null: all equal. With weights that sum to 0 the transform is the
-/// identity and the singular values are 0.
+/// `weights` (non-negative) may be null: all equal. With weights that sum to 0, or numbers that are
+/// not finite, the transform is the identity and the singular values are 0.
 ProcrustesSolution procrustes(const Coordinates& x, const Coordinates& y, const float* weights,
                               Index count) noexcept;
 

@@ -76,7 +76,7 @@ enum class Status {
   low_confidence,  // a pose was found, but it is more likely wrong than right
   too_few_points,  // a cloud has fewer points than the network needs: no pose
   not_finite,      // a coordinate is NaN, infinite or beyond 1e300: no pose
-  degenerate,      // all points of a cloud coincide, or no rotation is determined: no pose
+  degenerate,      // a cloud's points coincide or lie on a line, or no rotation is determined: no pose
   ambiguous,       // mode verified: a pose was found, but another fits nearly as well (a symmetry)
 };
 

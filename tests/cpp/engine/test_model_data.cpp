@@ -137,6 +137,10 @@ TEST_CASE("keys and metadata that only inform are allowed") {
   REQUIRE(model.name() == "random");
   REQUIRE(model.points() == 1024);
   REQUIRE(model.min_points() == 24);
+  draft.metadata["provenance.data"] = std::string(4097, 'p');
+  refused(draft, ErrorCode::wrong_architecture, "provenance.data");
+  draft.metadata["provenance.data"] = std::uint64_t{1};
+  refused(draft, ErrorCode::wrong_architecture, "provenance.data");
 }
 
 TEST_CASE("damaged bytes are refused before the architecture is looked at") {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <limits>
 
 #include "helpers.hpp"
 
@@ -125,6 +126,21 @@ TEST_CASE("no weight at all, or coinciding points: a finite motion and no rank")
   REQUIRE(is_rotation(single.transform.rotation));
   REQUIRE(single.transform.translation.allFinite());
   REQUIRE(single.singular_values(0) < 1e-12);
+}
+
+TEST_CASE("numbers that are not finite give the identity") {
+  Random random(87);
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    for (int where = 0; where < 3; ++where) {
+      Paired pairs(7, random_transform(random), 0.0f, random);
+      (where == 0 ? pairs.x[1][3] : where == 1 ? pairs.y[2][6] : pairs.weights[0]) = bad;
+      const auto s = procrustes(pairs.source(), pairs.target(), pairs.weights.data(), 7);
+      REQUIRE(s.transform.rotation == Eigen::Matrix3d::Identity());
+      REQUIRE(s.transform.translation.isZero(0));
+      REQUIRE(s.singular_values.isZero(0));
+    }
+  }
 }
 
 TEST_CASE("composition does the second motion first") {

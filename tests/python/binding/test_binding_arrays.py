@@ -184,5 +184,5 @@ def test_any_numbers_give_a_status_and_a_finite_pose_or_none(
     assert result.has_pose == (result.status in ("ok", "low_confidence"))
     if len(points) < model.min_points:
         assert result.status == "too_few_points"
-    elif not (np.abs(points) <= 1e300).all():
+    elif not (np.abs(points.astype(float)) <= 1e300).all():
         assert result.status == "not_finite"

@@ -17,11 +17,16 @@ from parity_pairs import (
     same_choices,
 )
 from parity_twin import REPORTS, Stages, Twin
+from scipy.stats import binomtest
+
+from vnreg_train.data.protocol import make_pair
+from vnreg_train.data.shapes import ShapeSet
 
 Program = Callable[[Points, Points], Stages]
 
 SIZES = (64, 333, 768, 1024)
 MAX_ROTATION_DEG = 0.01
+MAX_SHARE = 0.01
 
 
 def make_pairs(count: int, noisy: bool) -> Iterator[TestPair]:
@@ -65,20 +70,31 @@ def report(model: str, figures: dict[str, Any]) -> None:
     path.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
 
 
-@pytest.mark.parametrize(("name", "count"), [("shipped", 128), ("paper", 32)])
+@pytest.mark.parametrize(("name", "count"), [("shipped", 256), ("paper", 32)])
 def test_noisy_pairs_have_the_poses_and_the_choices_of_torch(
     name: str, count: int, twin: Callable[[str], Twin]
 ) -> None:
     model = twin(name)
     figures = compare(model.engine, model.reference, make_pairs(count, noisy=True))
-    torch_alone = compare(model.reference, model.exact, make_pairs(count, noisy=True))
-    figures["share_torch_float32_against_float64"] = torch_alone["share"]
     report(name, {"noisy": figures})
     assert figures["largest_rotation_difference_deg"] <= MAX_ROTATION_DEG
-    # Near ties of significances, similarities and weights: rounding decides, in torch as well.
-    spread = np.sqrt(max(torch_alone["share"], 0.05) / count)  # of a share, at most
+    # A sample of pairs speaks against a share below MAX_SHARE only where chance hardly explains it.
+    different = figures["pairs_with_different_choices"]
+    assert binomtest(different, count, MAX_SHARE, alternative="greater").pvalue > 0.01
+    assert figures["pairs_with_undetermined_rotation"] <= 0.15 * count
+
+
+def assert_as_alike_as_torch_and_torch(
+    model: Twin, setting: str, pairs: Callable[[], Iterable[TestPair]]
+) -> None:
+    """The engine differs from torch about as often as torch in float32 from torch in float64."""
+    figures = compare(model.engine, model.reference, pairs())
+    torch_alone = compare(model.reference, model.exact, pairs())
+    figures["share_torch_float32_against_float64"] = torch_alone["share"]
+    report(model.name, {setting: figures})
+    assert figures["largest_rotation_difference_deg"] <= MAX_ROTATION_DEG
+    spread = np.sqrt(max(torch_alone["share"], 0.02) / figures["pairs"])  # of a share, at most
     assert figures["share"] <= torch_alone["share"] + 3 * spread
-    assert figures["pairs_with_undetermined_rotation"] <= 0.05 * count
 
 
 @pytest.mark.parametrize(("name", "count"), [("shipped", 64), ("paper", 16)])
@@ -88,14 +104,21 @@ def test_clean_pairs_choose_as_alike_as_torch_and_torch(
     """Under the true pose of a clean pair every kept point coincides with its match.
 
     The direction between the two, which is a feature of the pair (paper, section III-D), is then
-    the rounding error of a zero vector, scaled to length 1. Torch in float32 and torch in float64
-    choose differently for that reason, and so does the engine: about as often, not more.
+    the rounding error of a zero vector, scaled to length 1: no two float32 programs agree on it.
     """
-    model = twin(name)
-    figures = compare(model.engine, model.reference, make_pairs(count, noisy=False))
-    torch_alone = compare(model.reference, model.exact, make_pairs(count, noisy=False))
-    figures["share_torch_float32_against_float64"] = torch_alone["share"]
-    report(name, {"clean": figures})
-    assert figures["largest_rotation_difference_deg"] <= MAX_ROTATION_DEG
-    spread = np.sqrt(max(torch_alone["share"], 0.05) / count)  # of a share, at most
-    assert figures["share"] <= torch_alone["share"] + 3 * spread
+    assert_as_alike_as_torch_and_torch(twin(name), "clean", lambda: make_pairs(count, noisy=False))
+
+
+@pytest.mark.furniture
+def test_furniture_pairs_choose_as_alike_as_torch_and_torch(
+    twin: Callable[[str], Twin], furniture_test: ShapeSet
+) -> None:
+    """A pair of 1,024 points makes some 850 choices, and flat furniture has many near ties."""
+
+    def pairs() -> Iterator[TestPair]:
+        for index in range(64):
+            pair = make_pair(furniture_test, index, "noisy", 180.0)
+            clouds = (c[: SIZES[index % 4]].astype(float) for c in (pair.source, pair.target))
+            yield TestPair(*clouds)
+
+    assert_as_alike_as_torch_and_torch(twin("shipped"), "furniture, noisy", pairs)
