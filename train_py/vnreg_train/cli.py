@@ -72,18 +72,6 @@ def golden(arguments: argparse.Namespace) -> None:
     export_golden(network, Path(arguments.model), Path(arguments.out), source, target)
 
 
-def evaluate(arguments: argparse.Namespace) -> None:
-    from vnreg_train.evaluate.commands import evaluate_main
-
-    evaluate_main(arguments)
-
-
-def calibrate(arguments: argparse.Namespace) -> None:
-    from vnreg_train.evaluate.commands import calibrate_main
-
-    calibrate_main(arguments)
-
-
 def parser() -> argparse.ArgumentParser:
     root = argparse.ArgumentParser(prog="vnreg-train", description=__doc__)
     commands = root.add_subparsers(required=True, metavar="COMMAND")
@@ -123,34 +111,9 @@ def parser() -> argparse.ArgumentParser:
     gold.add_argument("--shape", type=int, default=0, help="index in the validation split")
     gold.set_defaults(run_command=golden)
 
-    def engine_arguments(command: argparse.ArgumentParser, split: str) -> None:
-        command.add_argument("model", help="a .vnr file")
-        command.add_argument("--data", default="data/furniture")
-        command.add_argument("--split", default=split)
-        command.add_argument("--threads", type=int, default=1)
-        command.add_argument("--limit", type=int, help="only the first so many shapes")
+    from vnreg_train.evaluate.arguments import add_evaluation_commands
 
-    table = commands.add_parser(
-        "evaluate", help="recall per setting and angle range, by the engine"
-    )
-    engine_arguments(table, "test")
-    table.add_argument("--protocol", default="P0", choices=("P0", "text"))
-    table.add_argument(
-        "--settings", nargs="+", default=["clean", "noisy", "independent", "partial"]
-    )
-    table.add_argument("--angles", nargs="+", type=float, default=[45.0, 90.0, 135.0, 180.0])
-    table.add_argument("--mode", default="paper", help="coarse, paper or verified")
-    table.add_argument("--seed", type=int, default=0)
-    table.add_argument("--json", default="build/reports/recall.json")
-    table.add_argument("--report", help="Markdown file whose recall section is rewritten")
-    table.set_defaults(run_command=evaluate)
-
-    fit_confidence = commands.add_parser(
-        "calibrate", help="fit the confidence on the validation split"
-    )
-    engine_arguments(fit_confidence, "validation")
-    fit_confidence.add_argument("--out", help="write the model with its calibration here")
-    fit_confidence.set_defaults(run_command=calibrate)
+    add_evaluation_commands(commands)
     return root
 
 

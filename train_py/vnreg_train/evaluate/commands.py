@@ -1,37 +1,51 @@
-"""The bodies of `vnreg-train evaluate` and `vnreg-train calibrate`."""
+"""The bodies of the evaluation's commands."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
+from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
-from vnreg_train.data.shapes import load_shapes
+# Before anything that opens a thread pool is imported: every method is timed on one thread.
+os.environ["OMP_NUM_THREADS"] = "1"
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+from vnreg_train.data.shapes import load_shapes  # noqa: E402
+from vnreg_train.evaluate.methods import MODES, EngineMethod, Method  # noqa: E402
+from vnreg_train.evaluate.rows import select_rows  # noqa: E402
+from vnreg_train.evaluate.run import Pairing, answer_all  # noqa: E402
+from vnreg_train.evaluate.scores import score  # noqa: E402
+from vnreg_train.evaluate.symmetry import SYMMETRIES, read_symmetries  # noqa: E402
+from vnreg_train.evaluate.table import HEAD, LEGEND, line  # noqa: E402
+
+
+def make_methods(arguments: argparse.Namespace) -> list[Callable[[], Method]]:
+    """How to make each method that --methods names. Raises ValueError for an unknown one."""
+    makers: list[Callable[[], Method]] = []
+    for name in arguments.methods:
+        if name not in MODES:
+            raise ValueError(f"no method is called {name!r}; known are {', '.join(MODES)}")
+        path = arguments.paper_model if name == "paper" else arguments.model
+        makers.append(partial(EngineMethod, name, Path(path) if path else None))
+    return makers
 
 
 def evaluate_main(arguments: argparse.Namespace) -> None:
-    """Measures the recall table; prints it, and writes --json and --report."""
-    from vnreg_train.evaluate.recall import evaluate_model, write_json
-    from vnreg_train.evaluate.report import markdown, write_report
-
-    shapes = load_shapes(Path(arguments.data), arguments.split, queries=0)
-    table = evaluate_model(
-        Path(arguments.model),
-        shapes,
-        arguments.split,
-        settings=arguments.settings,
-        angles_deg=arguments.angles,
-        protocol=arguments.protocol,
-        seed=arguments.seed,
-        mode=arguments.mode,
-        threads=arguments.threads,
-        limit=arguments.limit,
-    )
-    print(markdown(table), end="")
-    write_json(table, Path(arguments.json))
-    if arguments.report:
-        write_report(table, Path(arguments.report))
+    """Aligns every pair by every method; prints a line per row and method."""
+    pairing = Pairing(arguments.split, arguments.shapes, arguments.seed, Path(arguments.data))
+    groups = read_symmetries(SYMMETRIES) if SYMMETRIES.exists() else {}
+    folder = Path(arguments.run) if arguments.run else None
+    print(HEAD, flush=True)
+    rows = select_rows(arguments.rows)
+    for name, row, estimates in answer_all(
+        make_methods(arguments), rows, pairing, folder, arguments.jobs
+    ):
+        print(line(row.name, name, score(list(pairing.pairs(row)), estimates, groups)), flush=True)
+    print(LEGEND)
 
 
 def calibrate_main(arguments: argparse.Namespace) -> None:

@@ -16,7 +16,7 @@ import vnreg
 from vnreg_train.data.protocol import Pair, make_pair, rotation_error_deg, translation_error
 from vnreg_train.data.shapes import ShapeSet
 
-Mode = Literal["coarse", "paper"]
+Mode = Literal["coarse", "paper", "verified"]
 MAX_ROTATION_DEG = 5.0
 MAX_TRANSLATION = 0.2
 

@@ -1,4 +1,4 @@
-"""The paper's recall table: settings by angle ranges, coarse alone and coarse + fine."""
+"""The paper's recall table: settings by angle ranges, by register."""
 
 from __future__ import annotations
 
@@ -20,7 +20,12 @@ from vnreg_train.export.model import export_model
 from vnreg_train.networks.registration import RegistrationNetwork
 
 PAPER_SETTINGS = ("clean", "noisy", "independent", "partial")
-REGISTERS = ("coarse", "fine")
+# What each mode is scored by; the last one is the pose that the mode returns.
+REGISTERS: dict[Mode, tuple[str, ...]] = {
+    "coarse": ("coarse",),
+    "paper": ("coarse", "fine"),
+    "verified": ("verified",),
+}
 
 
 def wilson_interval(hits: int, trials: int, z: float = 1.959964) -> tuple[float, float]:
@@ -94,21 +99,23 @@ class Cell:
         return cell
 
 
-def _scores(outcomes: Outcomes, chosen: NDArray[np.bool_] | slice) -> dict[str, Score]:
-    coarse = score(outcomes.coarse_rotation_deg[chosen], outcomes.coarse_translation[chosen])
-    fine = score(outcomes.rotation_deg[chosen], outcomes.translation[chosen])
-    return {"coarse": coarse, "fine": fine}
+def _scores(outcomes: Outcomes, chosen: NDArray[np.bool_] | slice, mode: Mode) -> dict[str, Score]:
+    scores = {}
+    for register in REGISTERS[mode]:
+        errors = (outcomes.rotation_deg, outcomes.translation)
+        if register == "coarse":
+            errors = (outcomes.coarse_rotation_deg, outcomes.coarse_translation)
+        scores[register] = score(errors[0][chosen], errors[1][chosen])
+    return scores
 
 
-def make_cell(setting: str, max_angle_deg: float, outcomes: Outcomes) -> Cell:
+def make_cell(setting: str, max_angle_deg: float, outcomes: Outcomes, mode: Mode = "paper") -> Cell:
     """Scores of one cell's outcomes."""
-    halves = [
-        _scores(outcomes, outcomes.same_crop == half)
-        if (outcomes.same_crop == half).any()
-        else None
-        for half in (1, 0)
-    ]
-    return Cell(setting, max_angle_deg, _scores(outcomes, slice(None)), *halves)
+    halves = []
+    for half in (1, 0):
+        chosen = outcomes.same_crop == half
+        halves.append(_scores(outcomes, chosen, mode) if chosen.any() else None)
+    return Cell(setting, max_angle_deg, _scores(outcomes, slice(None), mode), halves[0], halves[1])
 
 
 @dataclass(frozen=True)
@@ -119,7 +126,7 @@ class RecallTable:
     split: str
     protocol: str
     seed: int
-    mode: str
+    mode: Mode
     cells: tuple[Cell, ...]
     ms_median: float  # of one align call on one engine thread
 
@@ -130,9 +137,13 @@ class RecallTable:
                 return cell
         raise KeyError(f"no cell {setting!r} at {max_angle_deg}")
 
-    def mean_recall(self, register: str = "fine") -> float:
-        """Mean over the cells: the figure that model selection goes by."""
-        return float(np.mean([cell.scores[register].recall for cell in self.cells]))
+    @property
+    def registers(self) -> tuple[str, ...]:
+        return REGISTERS[self.mode]
+
+    def mean_recall(self) -> float:
+        """Of the returned poses, over the cells: the figure that model selection goes by."""
+        return float(np.mean([cell.scores[self.registers[-1]].recall for cell in self.cells]))
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -165,7 +176,7 @@ def recall_table(
     for setting in settings:
         for angle in angles_deg:
             outcomes = evaluator.run(shapes, setting, angle, protocol, seed, indices)
-            cells.append(make_cell(setting, float(angle), outcomes))
+            cells.append(make_cell(setting, float(angle), outcomes, mode))
             ms.append(outcomes.ms)
     median = float(np.median(np.concatenate(ms)))
     return RecallTable(model, split, protocol, seed, mode, tuple(cells), median)

@@ -5,11 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from vnreg_train.evaluate.recall import REGISTERS, RecallTable, Score
+from vnreg_train.evaluate.recall import RecallTable, Score
 
-BEGIN = "<!-- recall: begin (written by vnreg-train evaluate) -->"
-END = "<!-- recall: end -->"
-REGISTER_TITLES = {"coarse": "coarse alone", "fine": "coarse + fine"}
+REGISTER_TITLES = {
+    "coarse": "coarse alone",
+    "fine": "coarse + fine",
+    "verified": "mode verified",
+}
+
+
+def marks(mode: str) -> tuple[str, str]:
+    """Lines around the section of one mode, in the file that holds it."""
+    name = "recall" if mode == "paper" else f"recall, mode {mode}"
+    return f"<!-- {name}: begin (written by vnreg-train evaluate) -->", f"<!-- {name}: end -->"
 
 
 def _recall(score: Score) -> str:
@@ -26,10 +34,9 @@ def _rows(
 ) -> list[str]:
     """Rows 'setting | register | one column per angle' of scores, same_crop or opposite_crop."""
     angles = sorted({cell.max_angle_deg for cell in table.cells})
-    registers = REGISTERS if table.mode == "paper" else REGISTERS[:1]
     rows = []
     for setting in settings:
-        for register in registers:
+        for register in table.registers:
             cells = [getattr(table.cell(setting, angle), part) for angle in angles]
             if any(scores is None for scores in cells):
                 continue
@@ -48,9 +55,10 @@ def _grid(table: RecallTable, rows: list[str]) -> str:
 def markdown(table: RecallTable) -> str:
     """The whole section: recall with 95 % intervals, the halves of partial, median errors."""
     settings = list(dict.fromkeys(cell.setting for cell in table.cells))
-    pairs = table.cells[0].scores["coarse"].pairs
+    pairs = table.cells[0].scores[table.registers[0]].pairs
     parts = [
-        f"Model `{table.model}`, split `{table.split}`, protocol `{table.protocol}`, "
+        f"Model `{table.model}`, mode `{table.mode}`, split `{table.split}`, protocol "
+        f"`{table.protocol}`, "
         f"{pairs} pairs per cell, seed {table.seed}; measured through the engine. Recall in %: "
         "rotation error below 5° and translation error below 0.2, with the 95 % Wilson interval.",
         _grid(table, _rows(table, "scores", _recall, settings)),
@@ -73,18 +81,19 @@ def markdown(table: RecallTable) -> str:
 
 
 def write_report(table: RecallTable, path: Path) -> None:
-    """Puts the section between its two marks in a Markdown file; a file without them gets it last.
+    """Puts the section between its mode's marks in a Markdown file; without them it comes last.
 
     Raises ValueError where only one mark is there, or they are in the wrong order.
     """
-    section = f"{BEGIN}\n{markdown(table)}{END}\n"
+    begin_mark, end_mark = marks(table.mode)
+    section = f"{begin_mark}\n{markdown(table)}{end_mark}\n"
     text = path.read_text(encoding="utf-8") if path.exists() else "# Results\n"
-    begin, end = text.find(BEGIN), text.find(END)
+    begin, end = text.find(begin_mark), text.find(end_mark)
     if begin == -1 and end == -1:
         text = text.rstrip("\n") + "\n\n" + section
     elif 0 <= begin < end:
-        text = text[:begin] + section + text[end + len(END) :].removeprefix("\n")
+        text = text[:begin] + section + text[end + len(end_mark) :].removeprefix("\n")
     else:
-        raise ValueError(f"{path}: expected {BEGIN!r} before {END!r}")
+        raise ValueError(f"{path}: expected {begin_mark!r} before {end_mark!r}")
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")

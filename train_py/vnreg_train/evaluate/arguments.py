@@ -1,0 +1,56 @@
+"""The evaluation's commands of `vnreg-train`: their arguments (see commands.py for the bodies)."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+Subcommands = Any  # argparse names the type privately
+
+
+def add_evaluation_commands(commands: Subcommands) -> None:
+    """evaluate, calibrate."""
+    _add_evaluate(commands.add_parser("evaluate", help="measure methods on rows of pairs"))
+    _add_calibrate(commands.add_parser("calibrate", help="fit the confidence on validation pairs"))
+
+
+def _add_pairing(command: argparse.ArgumentParser, split: str, seed: int) -> None:
+    command.add_argument("--data", default="data/furniture", help="folder of the shapes")
+    command.add_argument("--split", default=split, choices=("train", "validation", "test"))
+    command.add_argument("--shapes", type=int, help="only so many, spread evenly over the split")
+    command.add_argument("--seed", type=int, default=seed)
+    command.add_argument("--jobs", type=int, default=1, help="processes, one thread each")
+
+
+def _add_evaluate(command: argparse.ArgumentParser) -> None:
+    _add_pairing(command, "test", 0)
+    command.add_argument(
+        "--rows", nargs="+", default=["all"], help="all, bars, p0, p1, or names with wildcards"
+    )
+    command.add_argument("--methods", nargs="+", default=["verified"])
+    command.add_argument("--model", help="a .vnr file for coarse and verified (default: built in)")
+    command.add_argument("--paper-model", default="models/small.vnr", help="for mode paper")
+    command.add_argument("--run", help="folder that keeps the answers; a second call goes on")
+    command.set_defaults(run_command=_evaluate)
+
+
+def _add_calibrate(command: argparse.ArgumentParser) -> None:
+    command.add_argument("model", help="a .vnr file")
+    command.add_argument("--data", default="data/furniture")
+    command.add_argument("--split", default="validation")
+    command.add_argument("--threads", type=int, default=1)
+    command.add_argument("--limit", type=int, help="only the first so many shapes")
+    command.add_argument("--out", help="write the model with its calibration here")
+    command.set_defaults(run_command=_calibrate)
+
+
+def _evaluate(arguments: argparse.Namespace) -> None:
+    from vnreg_train.evaluate.commands import evaluate_main
+
+    evaluate_main(arguments)
+
+
+def _calibrate(arguments: argparse.Namespace) -> None:
+    from vnreg_train.evaluate.commands import calibrate_main
+
+    calibrate_main(arguments)
