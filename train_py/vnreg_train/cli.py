@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from vnreg_train.training.config import TrainingConfig, load_config
+from vnreg_train.training.config import TrainingConfig, config_arch, load_config
 
 
 def build_data(arguments: argparse.Namespace) -> None:
@@ -31,6 +31,33 @@ def _with_steps(config: TrainingConfig, stage: str, steps: int | None) -> Traini
 
 
 def train(arguments: argparse.Namespace) -> None:
+    if config_arch(arguments.config) == "vnreg":
+        train_descriptor(arguments)
+    elif arguments.stage is None:
+        raise SystemExit("vnreg-train train: the paper's network needs --stage coarse or fine")
+    else:
+        train_stage(arguments)
+
+
+def train_descriptor(arguments: argparse.Namespace) -> None:
+    from dataclasses import replace
+
+    from vnreg_train.data.shapes import load_shapes
+    from vnreg_train.training.descriptor_config import load_descriptor_config
+    from vnreg_train.training.descriptor_train import DescriptorTrainer
+
+    config = load_descriptor_config(arguments.config)
+    if arguments.steps:
+        config = replace(config, optimisation=replace(config.optimisation, steps=arguments.steps))
+    if arguments.threads:
+        config = replace(config, threads=arguments.threads)
+    shapes = load_shapes(Path(arguments.data or config.data.folder), "train", queries=0)
+    run = Path(arguments.run or Path("runs") / config.name)
+    trainer = DescriptorTrainer(config, shapes, run)
+    trainer.run(max_minutes=arguments.minutes, progress=not arguments.quiet)
+
+
+def train_stage(arguments: argparse.Namespace) -> None:
     from dataclasses import replace
 
     from vnreg_train.data.shapes import load_shapes
@@ -46,14 +73,13 @@ def train(arguments: argparse.Namespace) -> None:
 
 
 def export(arguments: argparse.Namespace) -> None:
-    from vnreg_train.export.model import export_model, load_checkpoint
+    from vnreg_train.export.checkpoint import export_checkpoint
 
-    network, config = load_checkpoint(Path(arguments.checkpoint))
     extra = dict(pair.split("=", 1) for pair in arguments.provenance)
-    export_model(
-        network,
+    export_checkpoint(
+        Path(arguments.checkpoint),
         Path(arguments.out),
-        arguments.name or config["name"],
+        arguments.name,
         points=arguments.points,
         extra={f"provenance.{key}": value for key, value in extra.items()},
     )
@@ -84,9 +110,9 @@ def parser() -> argparse.ArgumentParser:
     data.add_argument("--jobs", type=int, default=2)
     data.set_defaults(run_command=build_data)
 
-    fit = commands.add_parser("train", help="train one stage; resumes from its checkpoint")
-    fit.add_argument("config", help="a TOML file, or the name of a shipped one: small, paper")
-    fit.add_argument("--stage", choices=("coarse", "fine"), required=True)
+    fit = commands.add_parser("train", help="train a network (or one stage); resumes")
+    fit.add_argument("config", help="a TOML file, or the name of a shipped one: vnreg, small")
+    fit.add_argument("--stage", choices=("coarse", "fine"), help="paper's network only")
     fit.add_argument("--run", help="folder of checkpoints and curves (default runs/NAME)")
     fit.add_argument("--data", help="folder of the shapes (default: as configured)")
     fit.add_argument("--steps", type=int, help="length of the schedule, instead of the configured")

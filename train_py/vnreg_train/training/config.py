@@ -68,7 +68,8 @@ class TrainingConfig:
 T = TypeVar("T")
 
 
-def _section(kind: type[T], name: str, values: dict[str, Any]) -> T:
+def checked_section(kind: type[T], name: str, values: dict[str, Any]) -> T:
+    """The dataclass `kind` of a TOML table; unknown keys are an error that names the known ones."""
     known = {f.name for f in fields(kind)}  # type: ignore[arg-type]
     unknown = sorted(set(values) - known)
     if unknown:
@@ -81,16 +82,26 @@ def parse_config(text: str) -> TrainingConfig:
     values = tomllib.loads(text)
     values["network"] = NetworkConfig.from_dict(values.get("network", {}))
     for name, kind in (("data", DataConfig), ("coarse", StageConfig), ("fine", StageConfig)):
-        values[name] = _section(kind, name, values.get(name, {}))
-    return _section(TrainingConfig, "top level", values)
+        values[name] = checked_section(kind, name, values.get(name, {}))
+    return checked_section(TrainingConfig, "top level", values)
 
 
-def load_config(path: str | Path) -> TrainingConfig:
-    """Reads a file, or one of the shipped configurations by its bare name (`small`, `paper`)."""
+def find_config(path: str | Path) -> Path:
+    """A file, or a shipped configuration by its bare name (`small`, `paper`, `vnreg`)."""
     path = Path(path)
     if not path.suffix and not path.exists():
         path = CONFIG_FOLDER / f"{path}.toml"
     if not path.exists():
         shipped = sorted(p.stem for p in CONFIG_FOLDER.glob("*.toml"))
         raise FileNotFoundError(f"{path}: no such configuration; shipped ones: {shipped}")
-    return parse_config(path.read_text(encoding="utf-8"))
+    return path
+
+
+def config_arch(path: str | Path) -> str:
+    """Which network a configuration is for: `paper`, or what its key `arch` says."""
+    return str(tomllib.loads(find_config(path).read_text(encoding="utf-8")).get("arch", "paper"))
+
+
+def load_config(path: str | Path) -> TrainingConfig:
+    """Reads a configuration of the paper's network."""
+    return parse_config(find_config(path).read_text(encoding="utf-8"))

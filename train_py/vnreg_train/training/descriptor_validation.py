@@ -1,0 +1,87 @@
+"""How good the proposals of the network `vnreg` are, before any judging: figures for experiments.
+
+The pairs are those of one recipe of the training mixture on other shapes; poses play no part.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from vnreg_train.data.mixture import MixtureSampler
+from vnreg_train.data.shapes import ShapeSet
+from vnreg_train.networks.coarse import procrustes
+from vnreg_train.networks.descriptor import DescriptorNetwork, Features, input_features
+from vnreg_train.training.descriptor_losses import MATCH_RADIUS
+from vnreg_train.training.descriptor_train import network_batch
+
+TOP = 320  # matches that the engine would look at
+ENCODED = 512
+PAIRS = 16  # at once
+
+
+def angle_deg(rotation: Tensor) -> Tensor:
+    """Angle of rotations (…, 3, 3), by the chord, which keeps small angles."""
+    chord = torch.linalg.matrix_norm(rotation - torch.eye(3, dtype=rotation.dtype))
+    return 2 * torch.rad2deg(torch.asin((chord / 8**0.5).clamp(max=1.0)))
+
+
+def frame_rotation(source: Tensor, target: Tensor) -> Tensor:
+    """The rotations (n, 3, 3) from frames (n, 3, F) to their partners."""
+    u, _, vh = torch.linalg.svd(target.double() @ source.double().transpose(1, 2))
+    sign = torch.ones_like(u[:, 0])
+    sign[:, 2] = torch.det(u @ vh).sign()
+    return (u * sign.unsqueeze(1)) @ vh
+
+
+def match_figures(source: Features, target: Features, x: Tensor, y: Tensor) -> dict[str, float]:
+    """Of one pair (no batch dimension); x, y (E, 3) aligned points in network coordinates."""
+    local = source.local @ target.local.T
+    both = local + source.context @ target.context.T
+    figures = {}
+    for name, similarity in (("sum", both), ("local", local)):
+        worth = torch.softmax(similarity, 0) * torch.softmax(similarity, 1)
+        worth = worth * torch.sigmoid(source.significance)[:, None]
+        worth = worth * torch.sigmoid(target.significance)[None]
+        value, partner = worth.max(1)
+        top = value.argsort(descending=True)[: min(TOP, len(value) * 5 // 8)]
+        right = (x[top] - y[partner[top]]).norm(dim=1) < MATCH_RADIUS
+        figures[f"inliers_{name}"] = float(right.float().mean())
+        if name == "sum":
+            figures["inliers_first_64"] = float(right[:64].float().mean())
+            rows, columns = top[right], partner[top][right]
+    for name in ("frames_local", "frames_context"):
+        a, b = getattr(source, name)[rows], getattr(target, name)[columns]
+        if len(a):
+            figures[f"{name}_30"] = float((angle_deg(frame_rotation(a, b)) < 30).float().mean())
+    return figures
+
+
+@torch.no_grad()
+def validate(
+    network: DescriptorNetwork, shapes: ShapeSet, recipe: str, points: int = 1024
+) -> dict[str, float]:
+    """Mean figures over the shapes, each in one pair of the recipe."""
+    sampler = MixtureSampler(shapes, points, min(PAIRS, len(shapes)), {recipe: 1.0}, seed=7)
+    rows: list[dict[str, float]] = []
+    for index in range(len(shapes) // sampler.batch_size):
+        pairs = sampler.batch(index)
+        encoded = min(ENCODED, int(pairs.source_count.min()), int(pairs.target_count.min()))
+        batch = network_batch(pairs)
+        inputs = input_features(batch.points, batch.mask, encoded, network.config.moment_radii)
+        centres = batch.points[:, :encoded]
+        features = network(centres, inputs)
+        source, target = (Features(*side) for side in zip(*(f.chunk(2) for f in features), strict=True))
+        x, y = centres.chunk(2)
+        x = x + batch.shift.unsqueeze(1)
+        rotation, _ = procrustes(
+            source.global_feature.transpose(1, 2), target.global_feature.transpose(1, 2)
+        )
+        coarse = angle_deg(rotation)
+        for k in range(len(x)):
+            one = (Features(*(f[k] for f in side)) for side in (source, target))
+            figures = match_figures(*one, x[k], y[k])
+            rows.append(figures | {"coarse_15": float(coarse[k] < 15)})
+    names = sorted({name for row in rows for name in row})
+    return {name: float(np.mean([row[name] for row in rows if name in row])) for name in names}
