@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import os
 from typing import Any
 
 Subcommands = Any  # argparse names the type privately
 
 
 def add_evaluation_commands(commands: Subcommands) -> None:
-    """evaluate, calibrate."""
+    """evaluate, calibrate, find-symmetries."""
     _add_evaluate(commands.add_parser("evaluate", help="measure methods on rows of pairs"))
     _add_calibrate(commands.add_parser("calibrate", help="fit the confidence on validation pairs"))
+    _add_find_symmetries(
+        commands.add_parser("find-symmetries", help="list the symmetries of the furniture models")
+    )
 
 
 def _add_pairing(command: argparse.ArgumentParser, split: str, seed: int) -> None:
@@ -44,7 +48,22 @@ def _add_calibrate(command: argparse.ArgumentParser) -> None:
     command.set_defaults(run_command=_calibrate)
 
 
+def _add_find_symmetries(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--data", default="data/furniture")
+    command.add_argument("--cache", default="data/furniture/cache", help="where packages are kept")
+    command.add_argument("--splits", nargs="+", default=["validation", "test"])
+    command.add_argument("--out", default="data/symmetries/furniture.json")
+    command.set_defaults(run_command=_find_symmetries)
+
+
+def _use_one_thread() -> None:
+    """Every method is timed on one thread; call before anything that opens a thread pool loads."""
+    os.environ["OMP_NUM_THREADS"] = "1"
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+
 def _evaluate(arguments: argparse.Namespace) -> None:
+    _use_one_thread()
     from vnreg_train.evaluate.commands import evaluate_main
 
     evaluate_main(arguments)
@@ -54,3 +73,9 @@ def _calibrate(arguments: argparse.Namespace) -> None:
     from vnreg_train.evaluate.commands import calibrate_main
 
     calibrate_main(arguments)
+
+
+def _find_symmetries(arguments: argparse.Namespace) -> None:
+    from vnreg_train.evaluate.commands import find_symmetries_main
+
+    find_symmetries_main(arguments)

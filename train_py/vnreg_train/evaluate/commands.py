@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-# Before anything that opens a thread pool is imported: every method is timed on one thread.
-os.environ["OMP_NUM_THREADS"] = "1"
-os.environ["OPENBLAS_NUM_THREADS"] = "1"
-
-from vnreg_train.data.shapes import load_shapes  # noqa: E402
-from vnreg_train.evaluate.methods import MODES, EngineMethod, Method  # noqa: E402
-from vnreg_train.evaluate.rows import select_rows  # noqa: E402
-from vnreg_train.evaluate.run import Pairing, answer_all  # noqa: E402
-from vnreg_train.evaluate.scores import score  # noqa: E402
-from vnreg_train.evaluate.symmetry import SYMMETRIES, read_symmetries  # noqa: E402
-from vnreg_train.evaluate.table import HEAD, LEGEND, line  # noqa: E402
+from vnreg_train.data.shapes import load_shapes
+from vnreg_train.evaluate.methods import MODES, EngineMethod, Method
+from vnreg_train.evaluate.rows import select_rows
+from vnreg_train.evaluate.run import Pairing, answer_all
+from vnreg_train.evaluate.scores import score
+from vnreg_train.evaluate.symmetry import SYMMETRIES, read_symmetries
+from vnreg_train.evaluate.table import HEAD, LEGEND, line
 
 
 def make_methods(arguments: argparse.Namespace) -> list[Callable[[], Method]]:
@@ -59,3 +54,16 @@ def calibrate_main(arguments: argparse.Namespace) -> None:
     print(json.dumps(asdict(calibration), indent=1))
     if arguments.out:
         write_calibrated(Path(arguments.model), Path(arguments.out), calibration)
+
+
+def find_symmetries_main(arguments: argparse.Namespace) -> None:
+    """Writes the list of symmetries; says how many shapes have any."""
+    from vnreg_train.evaluate.symmetry_file import find_furniture_symmetries, symmetries_text
+
+    groups = find_furniture_symmetries(
+        Path(arguments.data), Path(arguments.cache), arguments.splits
+    )
+    out = Path(arguments.out)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(symmetries_text(groups), encoding="utf-8")
+    print(f"{sum(not group.trivial for group in groups.values())} of {len(groups)} have symmetries")

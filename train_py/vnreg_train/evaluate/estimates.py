@@ -50,7 +50,9 @@ class Estimate:
             confidence=float("nan") if confidence is None else confidence,
             evidence=content["evidence"],
             covariance=None if covariance is None else np.array(covariance),
-            alternatives=tuple(np.array([*rows, [0, 0, 0, 1.0]]) for rows in content["alternatives"]),
+            alternatives=tuple(
+                np.array([*rows, [0, 0, 0, 1.0]]) for rows in content["alternatives"]
+            ),
         )
 
 
