@@ -10,12 +10,13 @@ Subcommands = Any  # argparse names the type privately
 
 
 def add_evaluation_commands(commands: Subcommands) -> None:
-    """evaluate, calibrate, find-symmetries."""
+    """evaluate, calibrate, find-symmetries, tune-peers."""
     _add_evaluate(commands.add_parser("evaluate", help="measure methods on rows of pairs"))
     _add_calibrate(commands.add_parser("calibrate", help="fit the confidence on validation pairs"))
     _add_find_symmetries(
         commands.add_parser("find-symmetries", help="list the symmetries of the furniture models")
     )
+    _add_tune_peers(commands.add_parser("tune-peers", help="choose the peers' settings"))
 
 
 def _add_pairing(command: argparse.ArgumentParser, split: str, seed: int) -> None:
@@ -40,11 +41,12 @@ def _add_evaluate(command: argparse.ArgumentParser) -> None:
 
 def _add_calibrate(command: argparse.ArgumentParser) -> None:
     command.add_argument("model", help="a .vnr file")
-    command.add_argument("--data", default="data/furniture")
-    command.add_argument("--split", default="validation")
-    command.add_argument("--threads", type=int, default=1)
-    command.add_argument("--limit", type=int, help="only the first so many shapes")
-    command.add_argument("--out", help="write the model with its calibration here")
+    command.add_argument("--mode", default="verified", choices=("paper", "verified"))
+    command.add_argument("--data", default="data/furniture", help="folder of the shapes")
+    command.add_argument("--split", default="validation", choices=("train", "validation"))
+    command.add_argument("--shapes", type=int, help="only so many, spread evenly over the split")
+    command.add_argument("--seeds", nargs="+", type=int, default=[11, 12, 13])
+    command.add_argument("--out", help="write the model with its calibration here (may be itself)")
     command.set_defaults(run_command=_calibrate)
 
 
@@ -54,6 +56,12 @@ def _add_find_symmetries(command: argparse.ArgumentParser) -> None:
     command.add_argument("--splits", nargs="+", default=["validation", "test"])
     command.add_argument("--out", default="data/symmetries/furniture.json")
     command.set_defaults(run_command=_find_symmetries)
+
+
+def _add_tune_peers(command: argparse.ArgumentParser) -> None:
+    _add_pairing(command, "validation", 7)
+    command.add_argument("--peers", nargs="+", help="only these")
+    command.set_defaults(run_command=_tune_peers, shapes=24)
 
 
 def _use_one_thread() -> None:
@@ -70,6 +78,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
 
 
 def _calibrate(arguments: argparse.Namespace) -> None:
+    _use_one_thread()
     from vnreg_train.evaluate.commands import calibrate_main
 
     calibrate_main(arguments)
@@ -79,3 +88,10 @@ def _find_symmetries(arguments: argparse.Namespace) -> None:
     from vnreg_train.evaluate.commands import find_symmetries_main
 
     find_symmetries_main(arguments)
+
+
+def _tune_peers(arguments: argparse.Namespace) -> None:
+    _use_one_thread()
+    from vnreg_train.evaluate.commands import tune_peers_main
+
+    tune_peers_main(arguments)

@@ -1,141 +1,154 @@
-"""Fits the model's confidence: the probability that a pose is right, from how well it fits.
+"""Fits a model's confidence on validation pairs: the probability that a mode's pose is right.
 
-confidence = sigmoid(bias + overlap_weight · overlap + residual_weight · rmse / inlier_distance)
+confidence = sigmoid(bias + sum over the mode's evidence of weight · value); right means within 5
+degrees and 0.2, in mode verified up to the shape's symmetry. Each mode has its keys in the model
+file (docs/design.md), and is fitted on the pairs that it is for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vnreg_train.data.protocol import ANGLES_DEG
-from vnreg_train.data.shapes import ShapeSet
-from vnreg_train.evaluate.outcomes import Evaluator, Outcomes, concatenated
-from vnreg_train.evaluate.recall import PAPER_SETTINGS
+from vnreg_train.data.mesh import Float64
+from vnreg_train.evaluate.confidence import Bools, auroc, fit_logistic, reliability, sigmoid
+from vnreg_train.evaluate.estimates import Estimate
+from vnreg_train.evaluate.methods import EngineMethod, Method
+from vnreg_train.evaluate.rows import Row, select_rows
+from vnreg_train.evaluate.run import Pairing, answers
+from vnreg_train.evaluate.scores import score
+from vnreg_train.evaluate.symmetry import SymmetryGroup
 from vnreg_train.model_file import read_model, write_model
 
-RIDGE = 1e-3  # of the standardised weights: bounds them where the classes separate
-Float64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+RIDGE = {"paper": 1e-3, "verified": 1e-3}
+PREFIX = {"paper": "calibration.", "verified": "calibration.verified."}
+# Verified: every P1 row, and P0 as much as the users of its protocol deserve.
+ROWS = {"paper": ("p0",), "verified": ("p1", "P0/*/180")}
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """The three numbers in the model file, and how they do on the pairs they were fitted to."""
+    """The fitted numbers, and how they do on the pairs they were fitted to and on others."""
 
+    mode: str
     bias: float
-    overlap: float
-    residual: float
+    weights: dict[str, float]  # by name of the evidence
     pairs: int
-    success_share: float
+    right_share: float
     auroc: float
-    ece: float  # expected calibration error, ten bins of equal width
+    ece: float
+    held_out_auroc: float  # each half of the shapes judged by a fit on the other half
+    held_out_ece: float
 
     def metadata(self) -> dict[str, float]:
         """Under the keys of docs/design.md."""
-        return {
-            "calibration.bias": self.bias,
-            "calibration.overlap": self.overlap,
-            "calibration.residual": self.residual,
-        }
+        values = {"bias": self.bias, **self.weights}
+        return {PREFIX[self.mode] + name: value for name, value in values.items()}
 
-    def confidence(self, overlap: Float64, relative_residual: Float64) -> Float64:
-        """As the engine computes it; arrays (N,)."""
-        return sigmoid(self.bias + self.overlap * overlap + self.residual * relative_residual)
+    def confidence(self, evidence: Mapping[str, float]) -> float:
+        """As the engine computes it."""
+        total = self.bias + sum(weight * evidence[name] for name, weight in self.weights.items())
+        return float(sigmoid(np.array(total)))
 
 
-def sigmoid(x: Float64) -> Float64:
-    """Without overflow, for any x."""
-    return np.exp(-np.logaddexp(0.0, -x))
+@dataclass(frozen=True)
+class Sample:
+    """Evidence (N, F) of poses, whether they are right (N,), and of which shape (N,)."""
+
+    names: tuple[str, ...]
+    evidence: Float64
+    right: Bools
+    shape: Float64
 
 
-def fit_logistic(features: Float64, label: Bools, iterations: int = 100) -> Float64:
-    """Ridge logistic regression by Newton's method: features (N, F) -> bias and weights (F + 1,).
-
-    Raises ValueError where all labels are equal: no probability can be learnt from them.
-    """
-    if label.all() or not label.any():
-        raise ValueError(f"expected right and wrong poses, got {int(label.sum())} of {label.size}")
-    mean, spread = features.mean(0), features.std(0)
-    spread = np.where(spread > 0, spread, 1.0)
-    x = np.column_stack([np.ones(len(features)), (features - mean) / spread])
-    ridge = RIDGE * np.diag([0.0] + [1.0] * features.shape[1])
-    weights = np.zeros(x.shape[1])
-    for _ in range(iterations):
-        p = sigmoid(x @ weights)
-        gradient = x.T @ (p - label) / len(x) + ridge @ weights
-        curvature = (x * (p * (1 - p))[:, None]).T @ x / len(x) + ridge
-        step = np.linalg.solve(curvature + 1e-12 * np.eye(len(weights)), gradient)
-        weights = weights - step / max(1.0, float(np.abs(step).max()))
-        if np.abs(step).max() < 1e-10:
-            break
-    slopes = weights[1:] / spread
-    return np.concatenate([[weights[0] - slopes @ mean], slopes])
-
-
-def auroc(confidence: Float64, success: Bools) -> float:
-    """Probability that a right pose has the higher confidence than a wrong one; ties count half."""
-    positive, negative = confidence[success], np.sort(confidence[~success])
-    if not positive.size or not negative.size:
-        raise ValueError("expected right and wrong poses")
-    below = np.searchsorted(negative, positive, side="left")
-    not_above = np.searchsorted(negative, positive, side="right")
-    return float((below + not_above).sum() / (2 * positive.size * negative.size))
-
-
-def expected_calibration_error(confidence: Float64, success: Bools, bins: int = 10) -> float:
-    """Mean over pairs of |mean confidence - share of right poses| of their bin (equal widths)."""
-    index = np.minimum((confidence * bins).astype(int), bins - 1)
-    error = 0.0
-    for bin_index in range(bins):
-        inside = index == bin_index
-        if inside.any():
-            error += inside.mean() * abs(confidence[inside].mean() - success[inside].mean())
-    return float(error)
-
-
-def fit_calibration(outcomes: Outcomes) -> Calibration:
-    """From outcomes of all kinds of pairs. Raises ValueError where all or none succeeded."""
-    features = np.column_stack([outcomes.overlap, outcomes.relative_residual])
-    success = outcomes.success
-    bias, overlap, residual = fit_logistic(features, success)
-    p = sigmoid(bias + features @ np.array([overlap, residual]))
+def fit_calibration(sample: Sample, mode: str) -> Calibration:
+    """Raises ValueError where all or no poses are right."""
+    weights = fit_logistic(sample.evidence, sample.right, RIDGE[mode])
+    fitted = _probability(sample.evidence, weights)
+    others = np.empty(len(fitted))
+    for half in (0, 1):
+        inside = sample.shape % 2 == half
+        other = fit_logistic(sample.evidence[~inside], sample.right[~inside], RIDGE[mode])
+        others[inside] = _probability(sample.evidence[inside], other)
     return Calibration(
-        bias=float(bias),
-        overlap=float(overlap),
-        residual=float(residual),
-        pairs=len(outcomes),
-        success_share=float(success.mean()),
-        auroc=auroc(p, success),
-        ece=expected_calibration_error(p, success),
+        mode=mode,
+        bias=float(weights[0]),
+        weights={n: float(w) for n, w in zip(sample.names, weights[1:], strict=True)},
+        pairs=len(fitted),
+        right_share=float(sample.right.mean()),
+        auroc=auroc(fitted, sample.right),
+        ece=reliability(fitted, sample.right).error,
+        held_out_auroc=auroc(others, sample.right),
+        held_out_ece=reliability(others, sample.right).error,
     )
 
 
+def _probability(evidence: Float64, weights: Float64) -> Float64:
+    return sigmoid(weights[0] + evidence @ weights[1:])
+
+
+def collect_sample(
+    method: Method,
+    mode: str,
+    pairing: Pairing,
+    seeds: Sequence[int],
+    groups: Mapping[str, SymmetryGroup],
+) -> Sample:
+    """The method's evidence on all the mode's rows, for several seeds of the pairs."""
+    names: tuple[str, ...] = ()
+    evidence, right, shape = [], [], []
+    for row, seed in _draws(mode, seeds):
+        drawn = replace(pairing, seed=seed)
+        pairs, estimates = list(drawn.pairs(row)), answers(method, row, drawn)
+        scores = score(pairs, estimates, groups)
+        correct = scores.symmetric() if mode == "verified" else scores.plain()
+        for pair, estimate, good in zip(pairs, estimates, correct, strict=True):
+            if estimate.T_target_source is not None:
+                names = names or _evidence_names(estimate, mode)
+                evidence.append([estimate.evidence[name] for name in names])
+                right.append(good)
+                shape.append(float(pair.shape))
+    return Sample(names, np.array(evidence), np.array(right, bool), np.array(shape))
+
+
+def _draws(mode: str, seeds: Sequence[int]) -> Iterator[tuple[Row, int]]:
+    for row in select_rows(ROWS[mode]):
+        for seed in seeds:
+            yield row, seed
+
+
+def _evidence_names(estimate: Estimate, mode: str) -> tuple[str, ...]:
+    if not estimate.evidence:
+        raise ValueError(f"the engine gives no evidence in mode {mode}: there is nothing to fit")
+    return tuple(estimate.evidence)
+
+
 def calibrate_model(
-    path: Path,
-    shapes: ShapeSet,
-    settings: Sequence[str] = PAPER_SETTINGS,
-    angles_deg: Sequence[float] = ANGLES_DEG,
-    seed: int = 1,
-    threads: int = 2,
-    limit: int | None = None,
+    path: Path | None,
+    mode: str,
+    pairing: Pairing,
+    seeds: Sequence[int],
+    groups: Mapping[str, SymmetryGroup],
 ) -> Calibration:
-    """Fits on the given shapes (the validation split) over all settings and ranges."""
-    evaluator = Evaluator.load(path, threads=threads)
-    indices = range(len(shapes))[:limit]
-    outcomes = [
-        evaluator.run(shapes, setting, angle, "P0", seed, indices)
-        for setting in settings
-        for angle in angles_deg
-    ]
-    return fit_calibration(concatenated(outcomes))
+    """Fits one mode of a model file (None: the built-in model) on the pairing's split."""
+    method = EngineMethod(mode, path)
+    return fit_calibration(collect_sample(method, mode, pairing, seeds, groups), mode)
 
 
 def write_calibrated(source: Path, destination: Path, calibration: Calibration) -> None:
-    """The same model with this calibration in its metadata, at another path or in place."""
+    """The same model with this calibration in place of the mode's old one.
+
+    At another path or in place. The other mode's numbers stay.
+    """
     metadata, tensors = read_model(source)
-    write_model(destination, metadata | calibration.metadata(), tensors)
+    old = [key for key in metadata if _belongs(key, calibration.mode)]
+    kept = {key: value for key, value in metadata.items() if key not in old}
+    write_model(destination, kept | calibration.metadata(), tensors)
+
+
+def _belongs(key: str, mode: str) -> bool:
+    verified = key.startswith(PREFIX["verified"])
+    return verified if mode == "verified" else key.startswith(PREFIX["paper"]) and not verified

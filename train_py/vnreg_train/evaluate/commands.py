@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from vnreg_train.data.shapes import load_shapes
 from vnreg_train.evaluate.methods import MODES, EngineMethod, Method
+from vnreg_train.evaluate.peers import PEERS, tuned_peer
 from vnreg_train.evaluate.rows import select_rows
 from vnreg_train.evaluate.run import Pairing, answer_all
 from vnreg_train.evaluate.scores import score
@@ -21,12 +21,25 @@ from vnreg_train.evaluate.table import HEAD, LEGEND, line
 def make_methods(arguments: argparse.Namespace) -> list[Callable[[], Method]]:
     """How to make each method that --methods names. Raises ValueError for an unknown one."""
     makers: list[Callable[[], Method]] = []
-    for name in arguments.methods:
-        if name not in MODES:
-            raise ValueError(f"no method is called {name!r}; known are {', '.join(MODES)}")
+    for name in select_methods(arguments.methods):
         path = arguments.paper_model if name == "paper" else arguments.model
-        makers.append(partial(EngineMethod, name, Path(path) if path else None))
+        if name in PEERS:
+            makers.append(partial(tuned_peer, name))
+        else:
+            makers.append(partial(EngineMethod, name, Path(path) if path else None))
     return makers
+
+
+def select_methods(names: Sequence[str]) -> list[str]:
+    """Modes and peers by name; `modes`, `peers` for all of them. ValueError for others."""
+    groups = {"modes": list(MODES), "peers": list(PEERS)}
+    known = [*MODES, *PEERS]
+    chosen: list[str] = []
+    for name in names:
+        if name not in groups and name not in known:
+            raise ValueError(f"no method is called {name!r}; known are {', '.join(known)}")
+        chosen += [one for one in groups.get(name, [name]) if one not in chosen]
+    return chosen
 
 
 def evaluate_main(arguments: argparse.Namespace) -> None:
@@ -47,13 +60,14 @@ def calibrate_main(arguments: argparse.Namespace) -> None:
     """Fits the confidence; prints it as JSON, and writes the calibrated model to --out."""
     from vnreg_train.evaluate.calibrate import calibrate_model, write_calibrated
 
-    shapes = load_shapes(Path(arguments.data), arguments.split, queries=0)
+    pairing = Pairing(arguments.split, arguments.shapes, data=Path(arguments.data))
+    model = Path(arguments.model)
     calibration = calibrate_model(
-        Path(arguments.model), shapes, threads=arguments.threads, limit=arguments.limit
+        model, arguments.mode, pairing, arguments.seeds, read_symmetries()
     )
     print(json.dumps(asdict(calibration), indent=1))
     if arguments.out:
-        write_calibrated(Path(arguments.model), Path(arguments.out), calibration)
+        write_calibrated(model, Path(arguments.out), calibration)
 
 
 def find_symmetries_main(arguments: argparse.Namespace) -> None:
@@ -67,3 +81,12 @@ def find_symmetries_main(arguments: argparse.Namespace) -> None:
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(symmetries_text(groups), encoding="utf-8")
     print(f"{sum(not group.trivial for group in groups.values())} of {len(groups)} have symmetries")
+
+
+def tune_peers_main(arguments: argparse.Namespace) -> None:
+    """Tries every point of the peers' grids and writes the best ones down."""
+    from vnreg_train.evaluate.peers import TUNED
+    from vnreg_train.evaluate.tune import tune_peers
+
+    pairing = Pairing(arguments.split, arguments.shapes, arguments.seed, Path(arguments.data))
+    tune_peers(arguments.peers or list(PEERS), pairing, read_symmetries(), TUNED)

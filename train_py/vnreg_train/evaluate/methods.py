@@ -59,10 +59,18 @@ class EngineMethod:
             ms=ms,
             status=result.status,
             confidence=result.confidence,
-            evidence={k: float(v) for k, v in getattr(result, "evidence", {}).items()},
+            evidence=_evidence(result, self.name),
             covariance=None if covariance is None else np.asarray(covariance),
             alternatives=tuple(a.T_target_source for a in result.alternatives),
         )
+
+
+def _evidence(result: vnreg.Result, mode: str) -> dict[str, float]:
+    """What the confidence of the mode is computed from, by the names of its model-file keys."""
+    if mode == "verified":
+        return {name: float(value) for name, value in getattr(result, "evidence", {}).items()}
+    near = result.inlier_distance
+    return {"overlap": result.overlap, "residual": result.rmse / near if near > 0 else 0.0}
 
 
 def _digest(path: Path) -> str:

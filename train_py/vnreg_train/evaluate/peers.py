@@ -66,10 +66,10 @@ PEERS = {
         "kiss_matcher_icp",
         ("kiss-matcher", "open3d-cpu"),
         {
-            "voxel_size": (0.02, 0.03, 0.05),
+            "voxel_size": (0.015, 0.02, 0.03, 0.05),
             "sampling": (False, True),
-            "normal_gain": (3.0, 5.0),
-            "feature_gain": (6.0, 8.0),
+            "normal_gain": (3.0,),
+            "feature_gain": (5.0, 8.0),
             "noise_gain": (1.0, 2.0),
             "icp_distance": (0.06,),
         },
