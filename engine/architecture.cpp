@@ -39,7 +39,10 @@ void check_provenance(const ModelFile& file) {
   }
 }
 
-double read_rms_radius(const ModelFile& file) {
+/// Moments have radii in network coordinates, so architecture `vnreg` has no use for coordinates as
+/// they are given.
+double read_rms_radius(const ModelFile& file, Family family) {
+  if (family == Family::vnreg) return file.get_f64("input.rms_radius", 1e-3, 1e3);
   const double radius = file.get_f64("input.rms_radius", 0.0, 1e3);
   if (radius != 0.0 && radius < 1e-3) {
     refuse("input.rms_radius", "0 or 1e-3 to 1e3", std::to_string(radius));
@@ -47,19 +50,7 @@ double read_rms_radius(const ModelFile& file) {
   return radius;
 }
 
-}  // namespace
-
-Index Architecture::min_points() const noexcept {
-  return std::max({neighbours, 3 * keep_divisor, Index{24}});
-}
-
-Architecture read_architecture(const ModelFile& file) {
-  if (const std::string arch = file.get_string("arch"); arch != "paper") {
-    refuse("arch", "paper", arch);
-  }
-  Architecture a;
-  a.name = read_name(file);
-  check_provenance(file);
+void read_paper_parameters(const ModelFile& file, Architecture& a) {
   a.channels_global = read_index(file, "channels.global", 4, max_channels);
   a.channels_local = read_index(file, "channels.local", 4, max_channels);
   if (a.channels_local % 4 != 0) {
@@ -73,7 +64,23 @@ Architecture read_architecture(const ModelFile& file) {
   a.shared_direction = file.get_bool("relu.shared_direction");
   a.fine_iterations = read_index(file, "fine.iterations", 0, 16);
   a.keep_divisor = read_index(file, "fine.keep_divisor", 1, 64);
-  a.rms_radius = read_rms_radius(file);
+}
+
+}  // namespace
+
+Index Architecture::min_points() const noexcept {
+  return std::max({neighbours, 3 * keep_divisor, Index{24}});
+}
+
+Architecture read_architecture(const ModelFile& file) {
+  Architecture a;
+  const std::string arch = file.get_string("arch");
+  if (arch != "paper" && arch != "vnreg") refuse("arch", "paper or vnreg", arch);
+  a.family = arch == "paper" ? Family::paper : Family::vnreg;
+  a.name = read_name(file);
+  check_provenance(file);
+  if (a.family == Family::paper) read_paper_parameters(file, a);
+  a.rms_radius = read_rms_radius(file, a.family);
   a.points = read_index(file, "input.points",
                         static_cast<std::uint64_t>(std::max(Index{64}, a.min_points())), 16384);
   return a;

@@ -1,4 +1,4 @@
-// The hyper-parameters of architecture `paper` (docs/design.md).
+// Which network a model holds, and the hyper-parameters of architecture `paper` (docs/design.md).
 #pragma once
 
 #include <optional>
@@ -11,7 +11,12 @@ namespace vnreg::detail {
 
 using kernels::Index;
 
+enum class Family { paper, vnreg };
+
+/// Of architecture `vnreg` only family, name, rms_radius and points are set here; the rest of its
+/// hyper-parameters are in DescriptorArchitecture.
 struct Architecture {
+  Family family = Family::paper;
   std::string name;
   Index channels_global = 0;
   Index channels_local = 0;

@@ -1,59 +1,13 @@
 #include "engine/model_data.hpp"
 
-#include <set>
-#include <span>
 #include <string>
-#include <utility>
+
+#include "engine/tensor_set.hpp"
 
 namespace vnreg::detail {
 namespace {
 
-using kernels::Linear;
-using kernels::PackedMatrix;
-using kernels::RowMajorMatrix;
 using model_format::ModelFile;
-
-/// Hands out tensors by name and exact shape, and knows afterwards which were never asked for.
-class TensorSet {
- public:
-  explicit TensorSet(const ModelFile& file) : file_(file) {}
-
-  std::span<const float> vector(const std::string& name, Index size) {
-    taken_.insert(name);
-    return file_.tensor_f32(name, {static_cast<std::size_t>(size)});
-  }
-
-  std::span<const float> matrix(const std::string& name, Index rows, Index cols) {
-    taken_.insert(name);
-    return file_.tensor_f32(name, {static_cast<std::size_t>(rows), static_cast<std::size_t>(cols)});
-  }
-
-  RowMajorMatrix dense(const std::string& name, Index rows, Index cols) {
-    return Eigen::Map<const RowMajorMatrix>(matrix(name, rows, cols).data(), rows, cols);
-  }
-
-  PackedMatrix packed(const std::string& name, Index rows, Index cols) {
-    return PackedMatrix(dense(name, rows, cols));
-  }
-
-  /// `name`.weight (out, in) and `name`.bias (out).
-  Linear linear(const std::string& name, Index out, Index in) {
-    return {dense(name + ".weight", out, in), vector(name + ".bias", out)};
-  }
-
-  void refuse_others() const {
-    for (const auto& [name, tensor] : file_.tensors()) {
-      if (!taken_.contains(name)) {
-        throw Error(ErrorCode::wrong_architecture, "tensor \"" + name + "\"",
-                    "only the tensors of architecture paper", "one more");
-      }
-    }
-  }
-
- private:
-  const ModelFile& file_;
-  std::set<std::string> taken_;
-};
 
 /// Rows of a direction matrix: one per channel, or one for all.
 Index direction_rows(const Architecture& arch, Index channels) {
@@ -145,10 +99,15 @@ std::shared_ptr<const ModelData> read_model_data(const ModelFile& file) {
   model->arch = read_architecture(file);
   model->calibration = read_calibration(file);
   TensorSet tensors(file);
+  if (model->arch.family == Family::vnreg) {
+    model->descriptor_model = read_descriptor_model(file, tensors);
+    tensors.refuse_others("vnreg");
+    return model;
+  }
   read_encoder(tensors, *model);
   read_local_module(tensors, *model);
   read_fine_register(tensors, *model);
-  tensors.refuse_others();
+  tensors.refuse_others("paper");
   return model;
 }
 

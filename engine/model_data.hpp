@@ -1,4 +1,4 @@
-// The weights of architecture `paper`, checked against docs/design.md and packed once.
+// The weights of a model, checked against docs/design.md and packed once.
 #pragma once
 
 #include <array>
@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "engine/architecture.hpp"
+#include "engine/descriptor_model.hpp"
 #include "kernels/invariant.hpp"
 #include "kernels/linear.hpp"
 #include "kernels/pair_features.hpp"
@@ -18,6 +19,9 @@ namespace vnreg::detail {
 struct ModelData {
   Architecture arch;
   std::optional<Calibration> calibration;
+
+  // Architecture `vnreg`; nothing below belongs to it.
+  std::optional<DescriptorModel> descriptor_model;
 
   // Encoder (paper, section III-A). The first block of network 0 includes the linear layer `pre`.
   kernels::EdgeBlock network0_first;
