@@ -10,13 +10,14 @@ Subcommands = Any  # argparse names the type privately
 
 
 def add_evaluation_commands(commands: Subcommands) -> None:
-    """evaluate, calibrate, find-symmetries, tune-peers."""
+    """evaluate, calibrate, find-symmetries, tune-peers, report."""
     _add_evaluate(commands.add_parser("evaluate", help="measure methods on rows of pairs"))
     _add_calibrate(commands.add_parser("calibrate", help="fit the confidence on validation pairs"))
     _add_find_symmetries(
         commands.add_parser("find-symmetries", help="list the symmetries of the furniture models")
     )
     _add_tune_peers(commands.add_parser("tune-peers", help="choose the peers' settings"))
+    _add_report(commands.add_parser("report", help="write the results of a run down"))
 
 
 def _add_pairing(command: argparse.ArgumentParser, split: str, seed: int) -> None:
@@ -64,6 +65,13 @@ def _add_tune_peers(command: argparse.ArgumentParser) -> None:
     command.set_defaults(run_command=_tune_peers, shapes=24)
 
 
+def _add_report(command: argparse.ArgumentParser) -> None:
+    _add_pairing(command, "test", 0)
+    command.add_argument("--run", required=True, help="folder that `evaluate --run` filled")
+    command.add_argument("--out", default="docs/results.md", help="the page; figures beside it")
+    command.set_defaults(run_command=_report)
+
+
 def _use_one_thread() -> None:
     """Every method is timed on one thread; call before anything that opens a thread pool loads."""
     os.environ["OMP_NUM_THREADS"] = "1"
@@ -95,3 +103,9 @@ def _tune_peers(arguments: argparse.Namespace) -> None:
     from vnreg_train.evaluate.commands import tune_peers_main
 
     tune_peers_main(arguments)
+
+
+def _report(arguments: argparse.Namespace) -> None:
+    from vnreg_train.evaluate.commands import report_main
+
+    report_main(arguments)

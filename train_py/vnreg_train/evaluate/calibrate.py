@@ -16,7 +16,7 @@ import numpy as np
 from vnreg_train.data.mesh import Float64
 from vnreg_train.evaluate.confidence import Bools, auroc, fit_logistic, reliability, sigmoid
 from vnreg_train.evaluate.estimates import Estimate
-from vnreg_train.evaluate.methods import EngineMethod, Method
+from vnreg_train.evaluate.methods import EngineMethod, Method, Mode
 from vnreg_train.evaluate.rows import Row, select_rows
 from vnreg_train.evaluate.run import Pairing, answers
 from vnreg_train.evaluate.scores import score
@@ -128,7 +128,7 @@ def _evidence_names(estimate: Estimate, mode: str) -> tuple[str, ...]:
 
 def calibrate_model(
     path: Path | None,
-    mode: str,
+    mode: Mode,
     pairing: Pairing,
     seeds: Sequence[int],
     groups: Mapping[str, SymmetryGroup],

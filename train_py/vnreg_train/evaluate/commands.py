@@ -20,26 +20,23 @@ from vnreg_train.evaluate.table import HEAD, LEGEND, line
 
 def make_methods(arguments: argparse.Namespace) -> list[Callable[[], Method]]:
     """How to make each method that --methods names. Raises ValueError for an unknown one."""
+    names = select_methods(arguments.methods)
     makers: list[Callable[[], Method]] = []
-    for name in select_methods(arguments.methods):
-        path = arguments.paper_model if name == "paper" else arguments.model
-        if name in PEERS:
-            makers.append(partial(tuned_peer, name))
-        else:
-            makers.append(partial(EngineMethod, name, Path(path) if path else None))
-    return makers
+    for mode in MODES:
+        if mode in names:
+            path = arguments.paper_model if mode == "paper" else arguments.model
+            makers.append(partial(EngineMethod, mode, Path(path) if path else None))
+    return makers + [partial(tuned_peer, name) for name in PEERS if name in names]
 
 
-def select_methods(names: Sequence[str]) -> list[str]:
-    """Modes and peers by name; `modes`, `peers` for all of them. ValueError for others."""
-    groups = {"modes": list(MODES), "peers": list(PEERS)}
-    known = [*MODES, *PEERS]
-    chosen: list[str] = []
-    for name in names:
-        if name not in groups and name not in known:
-            raise ValueError(f"no method is called {name!r}; known are {', '.join(known)}")
-        chosen += [one for one in groups.get(name, [name]) if one not in chosen]
-    return chosen
+def select_methods(patterns: Sequence[str]) -> set[str]:
+    """Modes and peers by name, `modes` or `peers` for all of them. ValueError for others."""
+    groups: dict[str, tuple[str, ...]] = {"modes": tuple(MODES), "peers": tuple(PEERS)}
+    groups |= {name: (name,) for names in tuple(groups.values()) for name in names}
+    unknown = [pattern for pattern in patterns if pattern not in groups]
+    if unknown:
+        raise ValueError(f"no method is called {unknown[0]!r}; known are {', '.join(groups)}")
+    return {name for pattern in patterns for name in groups[pattern]}
 
 
 def evaluate_main(arguments: argparse.Namespace) -> None:
@@ -90,3 +87,18 @@ def tune_peers_main(arguments: argparse.Namespace) -> None:
 
     pairing = Pairing(arguments.split, arguments.shapes, arguments.seed, Path(arguments.data))
     tune_peers(arguments.peers or list(PEERS), pairing, read_symmetries(), TUNED)
+
+
+def report_main(arguments: argparse.Namespace) -> None:
+    """Writes the page --out, and beside it the folder of its name with the JSON and the plots."""
+    from vnreg_train.evaluate.plots import draw_plots
+    from vnreg_train.evaluate.report import markdown
+    from vnreg_train.evaluate.results import collect_results, write_results
+
+    pairing = Pairing(arguments.split, arguments.shapes, arguments.seed, Path(arguments.data))
+    results = collect_results(Path(arguments.run), pairing, read_symmetries())
+    page = Path(arguments.out)
+    figures = page.with_suffix("")
+    write_results(results, figures / "results.json")
+    plots = [(caption, f"{figures.name}/{name}") for caption, name in draw_plots(results, figures)]
+    page.write_text(markdown(results, plots), encoding="utf-8")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -14,13 +14,16 @@ import vnreg._vnreg
 from vnreg_train.data.protocol import Pair
 from vnreg_train.evaluate.estimates import Estimate
 
-MODES = ("coarse", "paper", "verified")
+Mode = Literal["coarse", "paper", "verified"]
+MODES: tuple[Mode, ...] = ("coarse", "paper", "verified")
 
 
 class Method(Protocol):
     """Answers pairs, on one thread."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """Of the method's folder in a run, and of its column."""
 
     def identity(self) -> dict[str, Any]:
         """All that its answers depend on: answers of another identity are not reused."""
@@ -32,16 +35,20 @@ class Method(Protocol):
 class EngineMethod:
     """A mode of the engine with a model file, or with the built-in model."""
 
-    def __init__(self, mode: str, model: Path | None) -> None:
-        self.name, self._path = mode, model
+    def __init__(self, mode: Mode, model: Path | None) -> None:
+        self.mode, self._path = mode, model
         loaded = vnreg.Model.load(model) if model else vnreg.Model.builtin()
         self.model_name = loaded.name
         self._registrar = vnreg.Registrar(loaded, mode=mode, threads=1)
 
+    @property
+    def name(self) -> str:
+        return self.mode
+
     def identity(self) -> dict[str, Any]:
         """Digests of the compiled engine and of the model file."""
         return {
-            "mode": self.name,
+            "mode": self.mode,
             "engine_version": vnreg.__version__,
             "engine_sha256": _digest(Path(str(vnreg._vnreg.__file__))),
             "instruction_set": vnreg.instruction_set(),
@@ -59,7 +66,7 @@ class EngineMethod:
             ms=ms,
             status=result.status,
             confidence=result.confidence,
-            evidence=_evidence(result, self.name),
+            evidence=_evidence(result, self.mode),
             covariance=None if covariance is None else np.asarray(covariance),
             alternatives=tuple(a.T_target_source for a in result.alternatives),
         )

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from vnreg_train.data.mesh import Float64
+from vnreg_train.data.mesh import Float64, Int64
 from vnreg_train.data.protocol import Pair, rotation_error_deg, translation_error
 from vnreg_train.evaluate.estimates import Estimate
 from vnreg_train.evaluate.symmetry import TRIVIAL, SymmetryGroup
@@ -28,7 +28,7 @@ class Scores:
     symmetric_rotation_deg: Float64  # to the nearest pose that is right up to symmetry
     symmetric_translation: Float64
     overlap: Float64  # the true one, of the pair
-    same_crop: NDArray[np.int8]  # 1: cropped towards the same side, 0: not, -1: does not apply
+    same_crop: Int64  # 1: cropped towards the same side, 0: not, -1: does not apply
     symmetric_shape: Bools  # the shape has a group
     ms: Float64
     confidence: Float64  # NaN where the method has none
@@ -72,13 +72,11 @@ def score(
         _one(pair, estimate, groups.get(pair.name, TRIVIAL))
         for pair, estimate in zip(pairs, estimates, strict=True)
     ]
-    columns = zip(*rows, strict=True)
-    types: list[Callable[..., object]] = [np.float64] * 5 + [np.int8, np.bool_] + [np.float64] * 2
-    types += [np.bool_, np.bool_, np.float64]
-    return Scores(*(np.array(c, dtype=t) for c, t in zip(columns, types, strict=True)))
+    return Scores(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def _one(pair: Pair, estimate: Estimate, group: SymmetryGroup) -> tuple[object, ...]:
+def _one(pair: Pair, estimate: Estimate, group: SymmetryGroup) -> tuple[float | int | bool, ...]:
+    """The fields of Scores, in their order."""
     pose, truth = estimate.T_target_source, pair.T_target_source
     plain = symmetric = (180.0, np.inf)
     nees = np.nan
