@@ -51,7 +51,6 @@ double read_rms_radius(const ModelFile& file, Family family) {
 }
 
 void read_paper_parameters(const ModelFile& file, Architecture& a) {
-  a.channels_global = read_index(file, "channels.global", 4, max_channels);
   a.channels_local = read_index(file, "channels.local", 4, max_channels);
   if (a.channels_local % 4 != 0) {
     refuse("channels.local", "a multiple of 4", std::to_string(a.channels_local));
@@ -79,7 +78,12 @@ Architecture read_architecture(const ModelFile& file) {
   a.family = arch == "paper" ? Family::paper : Family::vnreg;
   a.name = read_name(file);
   check_provenance(file);
-  if (a.family == Family::paper) read_paper_parameters(file, a);
+  a.channels_global = read_index(file, "channels.global", 4, max_channels);
+  if (a.family == Family::paper) {
+    read_paper_parameters(file, a);
+  } else {
+    a.neighbours = 2;
+  }
   a.rms_radius = read_rms_radius(file, a.family);
   a.points = read_index(file, "input.points",
                         static_cast<std::uint64_t>(std::max(Index{64}, a.min_points())), 16384);

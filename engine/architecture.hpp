@@ -13,8 +13,9 @@ using kernels::Index;
 
 enum class Family { paper, vnreg };
 
-/// Of architecture `vnreg` only family, name, rms_radius and points are set here; the rest of its
-/// hyper-parameters are in DescriptorArchitecture.
+/// Of architecture `vnreg` only what both networks share is here: family, name, the rows of the
+/// global feature, rms_radius, points, and as `neighbours` the two that give the points' spacing.
+/// The rest of its hyper-parameters are in DescriptorArchitecture.
 struct Architecture {
   Family family = Family::paper;
   std::string name;

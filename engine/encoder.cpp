@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "engine/neighbourhood.hpp"
 #include "kernels/mean_pool.hpp"
 #include "kernels/vn_relu.hpp"
 
@@ -193,6 +194,7 @@ void record_local_stages(const ModelData& model, Workspace& w) noexcept {
 void encode_global(const ModelData& model, Workspace& w) noexcept {
   const Index channels = model.arch.channels_global;
   const Index rows = kernels::padded(channels);
+  find_edges(w);
   run_first_block(model, w);
   record("network0.block0", &Features::latent, channels, w);
   pool(rows, model.network0_rest[0], w);

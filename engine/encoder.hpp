@@ -1,11 +1,11 @@
-// The SE(3)-equivariant network, on both clouds side by side.
+// The SE(3)-equivariant network of the paper, on both clouds side by side.
 #pragma once
 
 #include "engine/workspace.hpp"
 
 namespace vnreg::detail {
 
-/// Networks 0 and 1 and the global head (paper, section III-A): features.latent and
+/// Edge vectors, networks 0 and 1 and the global head (paper, section III-A): features.latent and
 /// features.global.
 void encode_global(const ModelData& model, Workspace& workspace) noexcept;
 

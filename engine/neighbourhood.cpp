@@ -55,14 +55,19 @@ void find_neighbourhoods(const ModelData& model, Workspace& w) noexcept {
     w.cloud[side].index.build(w.cloud[side].coordinates(), w.cloud[side].count);
   });
   search_neighbours(model, w);
+  for (Index side = 0; side < 2; ++side) {
+    const Cloud& cloud = w.cloud[side];
+    w.recorder.coordinates(side_name(side), "points", cloud.coordinates(), cloud.count);
+  }
+}
+
+void find_edges(Workspace& w) noexcept {
   w.for_each_tile([&](Index side, Index tile, ThreadScratch&) {
     write_edges(w.cloud[side], tile, w.features[side].edges.data());
   });
   for (Index side = 0; side < 2; ++side) {
-    const Cloud& cloud = w.cloud[side];
-    w.recorder.coordinates(side_name(side), "points", cloud.coordinates(), cloud.count);
-    w.recorder.vectors(side_name(side), "edge", w.features[side].edges.data(), 3, 3, cloud.count,
-                       tile_points);
+    w.recorder.vectors(side_name(side), "edge", w.features[side].edges.data(), 3, 3,
+                       w.cloud[side].count, tile_points);
   }
 }
 

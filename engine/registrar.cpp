@@ -6,6 +6,7 @@
 #include "engine/cloud.hpp"
 #include "engine/coarse.hpp"
 #include "engine/cpu.hpp"
+#include "engine/descriptor_encoder.hpp"
 #include "engine/encoder.hpp"
 #include "engine/fine.hpp"
 #include "engine/model_data.hpp"
@@ -65,6 +66,16 @@ Status prepare(const ModelData& model, const Options& options, const PointsView 
   return Status::ok;
 }
 
+/// The features that the coarse register needs, and with architecture `vnreg` all others.
+void encode(const ModelData& model, const Options& options, Workspace& w) noexcept {
+  if (!model.descriptor_model) return encode_global(model, w);
+  encode_descriptors(*model.descriptor_model, w.cloud, options.seed, w.threads, w.descriptors,
+                     w.recorder);
+  for (Index side = 0; side < 2; ++side) {
+    w.features[side].global = w.descriptors.features[side].out.global;
+  }
+}
+
 /// t_user = c_target + s t - R c_source.
 Pose user_pose(const RigidTransform& network, double scale, const Cloud cloud[2]) noexcept {
   const Eigen::Vector3d source = Eigen::Map<const Eigen::Vector3d>(cloud[0].centroid);
@@ -107,7 +118,7 @@ Status run(const ModelData& model, const Options& options, const PointsView clou
   result.ms.prepare = watch.lap();
   if (prepared != Status::ok) return prepared;
 
-  encode_global(model, w);
+  encode(model, options, w);
   result.ms.encode = watch.lap();
   const CoarsePose coarse = register_coarse(model, w);
   result.ms.coarse = watch.lap();

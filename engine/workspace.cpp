@@ -99,6 +99,22 @@ bool has_fine_register(const ModelData& model, const Options& options) noexcept 
   return options.mode != Mode::coarse && model.arch.fine_iterations > 0;
 }
 
+void allocate_paper(const ModelData& model, const Options& options, Index max_points,
+                    Workspace& w) {
+  for (Features& f : w.features) {
+    allocate_encoder(model, max_points, f);
+    if (w.local) allocate_local(model, max_points, options.record_stages, f);
+  }
+  for (ThreadScratch& s : w.scratch) {
+    allocate_encoder_scratch(model, s);
+    if (w.local) allocate_local_scratch(model, s);
+  }
+  if (w.local) {
+    const Index kept = max_points / model.arch.keep_divisor;
+    allocate_fine(model, max_points, options.record_stages ? kept : w.threads, w.fine);
+  }
+}
+
 }  // namespace
 
 Workspace::Workspace(const ModelData& model, const Options& options, Index max_points)
@@ -106,19 +122,14 @@ Workspace::Workspace(const ModelData& model, const Options& options, Index max_p
       local(has_fine_register(model, options)),
       recorder(options.record_stages) {
   scratch.resize(static_cast<std::size_t>(threads));
-  for (Index side = 0; side < 2; ++side) {
-    cloud[side] = Cloud(max_points);
-    allocate_encoder(model, max_points, features[side]);
-    if (local) allocate_local(model, max_points, options.record_stages, features[side]);
-  }
-  for (ThreadScratch& s : scratch) {
-    s.neighbours = kernels::NeighbourScratch(max_points);
-    allocate_encoder_scratch(model, s);
-    if (local) allocate_local_scratch(model, s);
-  }
-  if (local) {
-    const Index kept = max_points / model.arch.keep_divisor;
-    allocate_fine(model, max_points, options.record_stages ? kept : threads, fine);
+  for (Cloud& c : cloud) c = Cloud(max_points);
+  for (ThreadScratch& s : scratch) s.neighbours = kernels::NeighbourScratch(max_points);
+  if (model.descriptor_model) {
+    descriptors = DescriptorWorkspace(*model.descriptor_model, max_points, threads,
+                                      options.record_stages);
+    for (Features& f : features) allocate(f.global, 3 * padded(model.arch.channels_global));
+  } else {
+    allocate_paper(model, options, max_points, *this);
   }
   allocate_residual(max_points, residual);
   if (options.mode == Mode::verified) verified = VerifiedWorkspace(max_points);

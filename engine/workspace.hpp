@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/cloud.hpp"
+#include "engine/descriptor_workspace.hpp"
 #include "engine/model_data.hpp"
 #include "engine/parallel.hpp"
 #include "engine/stage_recorder.hpp"
@@ -85,6 +86,7 @@ struct Workspace {
   FineBuffers fine;
   ResidualBuffers residual;
   VerifiedWorkspace verified;  // empty in the other modes
+  DescriptorWorkspace descriptors;  // of architecture `vnreg`, whose `features` hold global alone
   std::vector<ThreadScratch> scratch;
   StageRecorder recorder;
 

@@ -1,5 +1,7 @@
 #include "kernels/moments.hpp"
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <cmath>
 
 namespace vnreg::kernels {

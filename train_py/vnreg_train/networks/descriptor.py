@@ -35,6 +35,13 @@ class Inputs(NamedTuple):
     scalars: Tensor  # (B, E, 18)
 
 
+class StageEnd(NamedTuple):
+    """Vectors (B, E, 3, C) and scalars (B, E, H) of the points."""
+
+    v: Tensor
+    z: Tensor
+
+
 class Features(NamedTuple):
     """What the network says of a cloud; descriptors have length sqrt(temperature)."""
 
@@ -103,11 +110,13 @@ class Neighbourhood(nn.Module):
         n = rms_normalised(v)
         gate = self.gate(z)
         placed = points.unsqueeze(3) * gate.unsqueeze(2)  # (B, E, 3, K)
-        columns = torch.cat([placed.flatten(2), gate, n.flatten(2), z], dim=2)
-        sums = (weights @ columns).split([placed[0, 0].numel(), gate.shape[2], n[0, 0].numel(), z.shape[2]], dim=2)
-        offsets = (sums[0].unflatten(2, (3, -1)) - points.unsqueeze(3) * sums[1].unsqueeze(2)) / self.radius
-        collected = torch.cat([offsets, sums[2].unflatten(2, (3, -1))], dim=3)
-        return v + self.linear(collected), sums[3]
+        columns = [placed.flatten(2), gate, n.flatten(2), z]
+        sums = weights @ torch.cat(columns, dim=2)
+        places, gates, vectors, scalars = sums.split([c.shape[2] for c in columns], dim=2)
+        moved = points.unsqueeze(3) * gates.unsqueeze(2)
+        offsets = (places.unflatten(2, (3, -1)) - moved) / self.radius
+        collected = torch.cat([offsets, vectors.unflatten(2, (3, -1))], dim=3)
+        return v + self.linear(collected), scalars
 
 
 class Invariants(nn.Module):
@@ -178,50 +187,66 @@ class DescriptorNetwork(nn.Module):
         self.scalar_mean.copy_(flat.mean(0))
         self.scalar_scale.copy_(1 / flat.std(0).clamp(min=1e-6))
 
-    def forward(self, points: Tensor, inputs: Inputs) -> Features:
-        """points (B, E, 3): the encoded points, about their cloud's centroid."""
+    def point_stage(self, inputs: Inputs) -> tuple[Tensor, Tensor]:
+        """Moments to v (B, E, 3, C) and z1 (B, E, H)."""
         scalars = (inputs.scalars - self.scalar_mean) * self.scalar_scale
         z0 = functional.relu(self.scalar0(scalars))
         v = self.pre_local(inputs.local * self.local_scale) * self.pre_gate(z0).unsqueeze(2)
         v = self.block0(v)
-        z1 = functional.relu(self.scalar1(torch.cat([self.invariants0(rms_normalised(v)), z0], 2)))
+        products = self.invariants0(rms_normalised(v))
+        return v, functional.relu(self.scalar1(torch.cat([products, z0], 2)))
 
-        v, near = self.neighbourhood0(points, v, z1)
+    def local_stage(self, points: Tensor, v: Tensor, z: Tensor) -> tuple[Tensor, Tensor]:
+        """The first neighbourhood: v and z2, which no far point changes."""
+        v, near = self.neighbourhood0(points, v, z)
         for block in self.local_blocks:
             v = block(v)
-        n = rms_normalised(v)
-        z2 = functional.relu(self.scalar2(torch.cat([self.invariants1(n), z1, near], 2)))
-        z2 = functional.relu(self.scalar3(z2))
-        local, frames_local = self.local_descriptor(z2), self.local_frames(n)
+        products = self.invariants1(rms_normalised(v))
+        z = functional.relu(self.scalar2(torch.cat([products, z, near], 2)))
+        return v, functional.relu(self.scalar3(z))
 
+    def context_stage(
+        self, points: Tensor, inputs: Inputs, v: Tensor, z: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Position, the second neighbourhood and pooled blocks: v and z3."""
         v = v + self.pre_context(inputs.context * self.context_scale)
-        v, near = self.neighbourhood1(points, v, z2)
+        v, near = self.neighbourhood1(points, v, z)
         for block in self.context_blocks:
             v = block(v)
-        n = rms_normalised(v)
-        pooled = z2.mean(1, keepdim=True).expand_as(z2)
-        z3 = functional.relu(self.scalar4(torch.cat([self.invariants2(n), z2, near, pooled], 2)))
-        z3 = functional.relu(self.scalar5(z3))
-        context, frames_context = self.context_descriptor(z3), self.context_frames(n)
-        logits = self.logits(z3).float()
-        temperature = torch.exp(0.5 * self.temperature)
+        products = self.invariants2(rms_normalised(v))
+        pooled = z.mean(1, keepdim=True).expand_as(z)
+        z = functional.relu(self.scalar4(torch.cat([products, z, near, pooled], 2)))
+        return v, functional.relu(self.scalar5(z))
+
+    def heads(self, points: Tensor, local: StageEnd, context: StageEnd) -> Features:
+        """What the ends of the local and of the context stage give."""
+        n_local, n = rms_normalised(local.v), rms_normalised(context.v)
+        exact = points.dtype  # the descriptors leave autocast
+        logits = self.logits(context.z).to(exact)
+        length = torch.exp(0.5 * self.temperature)
         return Features(
-            functional.normalize(local.float(), dim=2) * temperature[0],
-            functional.normalize(context.float(), dim=2) * temperature[1],
+            functional.normalize(self.local_descriptor(local.z).to(exact), dim=2) * length[0],
+            functional.normalize(self.context_descriptor(context.z).to(exact), dim=2) * length[1],
             logits[..., 0],
             logits[..., 1],
-            unit_frames(frames_local),
-            unit_frames(frames_context),
+            unit_frames(self.local_frames(n_local).to(exact)),
+            unit_frames(self.context_frames(n).to(exact)),
             self._global_feature(points, n, logits[..., 2]),
         )
 
+    def forward(self, points: Tensor, inputs: Inputs) -> Features:
+        """points (B, E, 3): the encoded points, about their cloud's centroid."""
+        v, z = self.point_stage(inputs)
+        local = StageEnd(*self.local_stage(points, v, z))
+        context = StageEnd(*self.context_stage(points, inputs, *local))
+        return self.heads(points, local, context)
+
     def _global_feature(self, points: Tensor, n: Tensor, logit: Tensor) -> Tensor:
         share = torch.softmax(logit, 1)[:, :, None, None]
-        vectors = self.global_linear((n * share).sum(1)).float()
+        vectors = self.global_linear((n * share).sum(1)).to(points.dtype)
         return vectors + (points.unsqueeze(3) * share).sum(1)
 
 
 def unit_frames(frames: Tensor) -> Tensor:
     """Frame vectors (B, E, 3, F) divided by their Frobenius norm."""
-    frames = frames.float()
     return frames * torch.rsqrt(frames.square().sum((2, 3), keepdim=True) + 1e-12)
