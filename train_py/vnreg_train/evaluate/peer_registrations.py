@@ -31,7 +31,7 @@ def open3d_ransac(
     """FPFH, RANSAC on three matches with Open3D's checks of edge length and distance; ICP."""
     registration = o3d.pipelines.registration
     o3d.utility.random.seed(SEED)
-    clouds = [_cloud(points, normal_radius) for points in (source, target)]
+    clouds = _cloud(source, normal_radius), _cloud(target, normal_radius)
     features = [_fpfh(cloud, feature_radius) for cloud in clouds]
     result = registration.registration_ransac_based_on_feature_matching(
         *clouds,
@@ -62,7 +62,7 @@ def open3d_fgr(
     """FPFH, fast global registration, ICP."""
     registration = o3d.pipelines.registration
     o3d.utility.random.seed(SEED)
-    clouds = [_cloud(points, normal_radius) for points in (source, target)]
+    clouds = _cloud(source, normal_radius), _cloud(target, normal_radius)
     features = [_fpfh(cloud, feature_radius) for cloud in clouds]
     option = registration.FastGlobalRegistrationOption(
         use_absolute_scale=True,
@@ -100,8 +100,8 @@ def kiss_matcher_icp(
     pose[:3, :3], pose[:3, 3] = solution.rotation, np.ravel(solution.translation)
     if not np.isfinite(pose).all():
         return None
-    clouds = [_cloud(points, voxel_size * normal_gain) for points in (source, target)]
-    return _icp(*clouds, pose, icp_distance)
+    plain = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(source))
+    return _icp(plain, _cloud(target, voxel_size * normal_gain), pose, icp_distance)
 
 
 def small_gicp_align(
@@ -156,7 +156,7 @@ def _icp(
     start: Float64,
     distance: float,
 ) -> Float64 | None:
-    """Point-to-plane ICP of clouds with normals, from the pose `start` (4, 4)."""
+    """Point-to-plane ICP to a target with normals, from the pose `start` (4, 4)."""
     registration = o3d.pipelines.registration
     result = registration.registration_icp(
         source,
