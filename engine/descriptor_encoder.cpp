@@ -60,31 +60,30 @@ class Pass {
   DescriptorWorkspace& w_;
 };
 
-/// The points with the smallest hashes, in the order of their indices.
+/// Orders the points at random; the index tells equal hashes apart.
+std::uint64_t selection_key(std::uint64_t seed, std::uint64_t point) noexcept {
+  return (counter_hash(seed, point) & ~std::uint64_t{0xffff}) | point;
+}
+
+/// The points with the smallest keys, in the spatial order of the index.
 void select_encoded(const Cloud& cloud, Index most, std::uint64_t seed,
                     DescriptorFeatures& f) noexcept {
-  CloudDescriptors& out = f.out;
-  out.count = std::min(cloud.count, most);
+  const Index wanted = std::min(cloud.count, most);
   for (Index i = 0; i < cloud.count; ++i) {
-    // The lower bits tell equal hashes apart and carry the index.
-    const std::uint64_t hash = counter_hash(seed, static_cast<std::uint64_t>(i));
-    f.keys[static_cast<std::size_t>(i)] =
-        (hash & ~std::uint64_t{0xffff}) | static_cast<std::uint64_t>(i);
+    f.keys[static_cast<std::size_t>(i)] = selection_key(seed, static_cast<std::uint64_t>(i));
   }
-  const auto begin = f.keys.begin();
-  if (out.count < cloud.count) {
-    std::nth_element(begin, begin + out.count, begin + cloud.count);
-  }
-  for (Index i = 0; i < out.count; ++i) {
-    out.encoded[static_cast<std::size_t>(i)] =
-        static_cast<std::uint32_t>(f.keys[static_cast<std::size_t>(i)] & 0xffff);
-  }
-  std::sort(out.encoded.begin(), out.encoded.begin() + out.count);
-  for (Index i = 0; i < out.count; ++i) {
-    const auto at = out.encoded[static_cast<std::size_t>(i)];
-    out.x[i] = cloud.x[at];
-    out.y[i] = cloud.y[at];
-    out.z[i] = cloud.z[at];
+  const auto last = f.keys.begin() + (wanted - 1);
+  std::nth_element(f.keys.begin(), last, f.keys.begin() + cloud.count);
+  CloudDescriptors& out = f.out;
+  out.count = 0;
+  for (Index i = 0; i < cloud.count; ++i) {
+    const std::uint32_t point = cloud.index.original()[i];
+    if (selection_key(seed, point) > *last) continue;
+    out.encoded[static_cast<std::size_t>(out.count)] = point;
+    out.x[out.count] = cloud.x[point];
+    out.y[out.count] = cloud.y[point];
+    out.z[out.count] = cloud.z[point];
+    ++out.count;
   }
 }
 

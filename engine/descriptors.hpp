@@ -13,7 +13,7 @@ namespace vnreg::detail {
 /// a stride is given.
 struct CloudDescriptors {
   Index count = 0;                     // E encoded points
-  std::vector<std::uint32_t> encoded;  // their indices in the cloud, ascending
+  std::vector<std::uint32_t> encoded;  // their indices in the cloud; near ones close together
   kernels::Floats x, y, z;             // their places
 
   // The similarity of two points is <local, local'> + <context, context'>: a logit.
