@@ -9,6 +9,8 @@ PRESET ?= release
 CLI := build/$(PRESET)/vnreg
 DEBIAN := cmake ninja-build g++ libeigen3-dev catch2 libcli11-dev nlohmann-json3-dev \
           libbenchmark-dev python3-dev python3-venv
+# What the wheel of Open3D, a peer of `make evaluate`, links with.
+PEERS_DEBIAN := libusb-1.0-0 libgl1 libegl1 libidn2-0
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python check sanitize \
@@ -69,8 +71,17 @@ train: data ## train models/small.vnr's network from the start (hours); resumes
 	$(PY) -m vnreg_train.cli train small --stage coarse
 	$(PY) -m vnreg_train.cli train small --stage fine
 
-evaluate: python data ## recall of the shipped model on the test split, into docs/results.md
-	$(PY) -m vnreg_train.cli evaluate models/small.vnr --report docs/results.md
+$(VENV)/.peers: requirements/evaluate.txt $(VENV)/.installed
+	@missing=$$(dpkg-query -W -f='$${Package} $${db:Status-Abbrev}\n' $(PEERS_DEBIAN) 2>&1 \
+	  | awk '/no packages found matching/ {print $$NF} $$2 == "un" {print $$1}'); \
+	if [ -n "$$missing" ]; then \
+	  $(SUDO) apt-get update -q && $(SUDO) apt-get install -y -q --no-install-recommends $$missing; fi
+	$(PY) -m pip install -q -r requirements/evaluate.txt
+	touch $@
+
+evaluate: python data $(VENV)/.peers ## all modes and peers on the test split, into docs/results.md; resumes
+	$(PY) -m vnreg_train.cli evaluate --methods modes peers --run runs/evaluate --jobs 2
+	$(PY) -m vnreg_train.cli report --run runs/evaluate
 
 bench: python build ## milliseconds per pair, kernels and engine beside torch
 	build/$(PRESET)/kernels_bench --benchmark_min_time=0.2
