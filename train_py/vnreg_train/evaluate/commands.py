@@ -15,7 +15,7 @@ from vnreg_train.evaluate.rows import select_rows
 from vnreg_train.evaluate.run import Pairing, answer_all
 from vnreg_train.evaluate.scores import score
 from vnreg_train.evaluate.symmetry import SYMMETRIES, read_symmetries
-from vnreg_train.evaluate.table import HEAD, LEGEND, line
+from vnreg_train.evaluate.table import HEAD, LEGEND, failure_lines, line
 
 
 def make_methods(arguments: argparse.Namespace) -> list[Callable[[], Method]]:
@@ -49,7 +49,10 @@ def evaluate_main(arguments: argparse.Namespace) -> None:
     for name, row, estimates in answer_all(
         make_methods(arguments), rows, pairing, folder, arguments.jobs
     ):
-        print(line(row.name, name, score(list(pairing.pairs(row)), estimates, groups)), flush=True)
+        pairs = list(pairing.pairs(row))
+        scores = score(pairs, estimates, groups)
+        lost = failure_lines(pairs, scores) if arguments.failures else []
+        print("\n".join([line(row.name, name, scores), *lost]), flush=True)
     print(LEGEND)
 
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vnreg_train.evaluate.scores import GROSS_DEG, LIMITS, Scores
+from vnreg_train.data.protocol import Pair
+from vnreg_train.evaluate.scores import GROSS_DEG, LIMITS, Bools, Scores
 
 HEAD = (
     f"{'row':<26}{'method':<12}{'pairs':>5} {'sym':>6} {'5/.2':>6} {'5/.05':>6} {'2/.02':>6}"
@@ -37,10 +38,17 @@ def line(row: str, method: str, scores: Scores) -> str:
     )
 
 
-def _percent(which: np.ndarray) -> str:
+def failure_lines(pairs: Sequence[Pair], scores: Scores) -> list[str]:
+    """One line for each pair that is not right up to symmetry."""
+    return [
+        f"    {pairs[k].shape:>4} {pairs[k].name:<60} {scores.symmetric_rotation_deg[k]:6.1f} deg"
+        f" {scores.symmetric_translation[k]:6.3f}  overlap {scores.overlap[k]:.2f}"
+        f"  confidence {scores.confidence[k]:.2f}"
+        f"{'  ambiguous' if scores.ambiguous[k] else ''}"
+        f"{'  right alternative' if scores.right_alternative[k] else ''}"
+        for k in np.flatnonzero(~scores.symmetric()).tolist()
+    ]
+
+
+def _percent(which: Bools) -> str:
     return f"{100 * which.mean():>6.1f}"
-
-
-def table(lines: Sequence[str]) -> str:
-    """Head, lines and legend."""
-    return "\n".join([HEAD, *lines, LEGEND])
