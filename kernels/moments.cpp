@@ -27,9 +27,9 @@ struct Sums {
     for (Index i = 0; i < lanes; ++i) {
       const float dx = px[i] - cx, dy = py[i] - cy, dz = pz[i] - cz;
       const float distance = dx * dx + dy * dy + dz * dz;
-      // Cut at r, so that the padding of the last leaf, infinitely far, counts zero times a number.
+      // Cut at r, where the weight is exactly zero: the padding of the last leaf is at 1e30.
       const float squared = distance < radius_squared ? distance : radius_squared;
-      const float root = 1.0f - squared * inverse;
+      const float root = (radius_squared - squared) * inverse;
       const float w = root * root;
       const float wx = w * dx, wy = w * dy, wz = w * dz;
       weight[i] += w;

@@ -6,7 +6,7 @@
 #include <cstdlib>
 
 #include "clouds.hpp"
-#include "random_model.hpp"
+#include "random_descriptor_model.hpp"
 
 extern "C" {
 void* __libc_malloc(std::size_t size);
@@ -88,6 +88,23 @@ TEST_CASE("align allocates nothing, with any input and any number of threads") {
         REQUIRE(statuses[4] == Status::too_few_points);
       }
     }
+  }
+}
+
+TEST_CASE("describing clouds allocates nothing") {
+  Random random(82);
+  const Points source = shape(1000, random), many = shape(5000, random), few = shape(24, random);
+  const Model model = random_descriptor_model().build();
+  for (const int threads : {1, 2, 3}) {
+    Registrar registrar(model, {.mode = Mode::coarse, .threads = threads});
+    const long before = allocations;
+    const Status statuses[] = {registrar.align(source, many).status,
+                               registrar.align(few, source).status,
+                               registrar.align(many, few).status};
+    const long after = allocations;
+    CAPTURE(threads);
+    REQUIRE(after == before);
+    for (const Status status : statuses) REQUIRE(status == Status::ok);
   }
 }
 
