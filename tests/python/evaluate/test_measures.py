@@ -38,6 +38,7 @@ def scores(rotation: list[float], **columns: object) -> Scores:
         "ambiguous": np.zeros(count, bool),
         "right_alternative": np.zeros(count, bool),
         "nees": np.full(count, np.nan),
+        "twin": np.zeros(count, bool),
     }
     return Scores(**{**fields, **{k: np.array(v) for k, v in columns.items()}})
 
@@ -91,10 +92,12 @@ def test_each_failure_counts_once_where_it_fits_first() -> None:
             [1, 180, 12, 90, 90, 90, 90],
             ambiguous=[1, 1, 1, 1, 0, 1, 0],
             right_alternative=[1, 0, 1, 1, 1, 0, 0],
+            twin=np.array([0, 0, 0, 1, 0, 0, 1], bool),
         )
     )
+    twins = found.pop("twins")
     assert found == {"no_pose": 1, "near": 1, "alternative": 2, "ambiguous": 1, "wrong": 1}
-    assert list(found) == ["no_pose", "near", "alternative", "ambiguous", "wrong"]
+    assert twins == 2
 
 
 def test_confidence_of_a_row_leaves_out_pairs_without_one() -> None:

@@ -23,7 +23,7 @@ def test_grids_are_products_without_repetition() -> None:
         points = [tuple(settings.values()) for settings in peer.settings()]
         assert len(set(points)) == len(points)
         assert len(points) == np.prod([len(values) for values in peer.grid.values()])
-        assert len(points) <= 40
+        assert 4 <= len(points) <= 16
 
 
 def test_the_chosen_settings_are_the_best_of_the_grid() -> None:

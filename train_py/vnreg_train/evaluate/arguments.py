@@ -34,8 +34,10 @@ def _add_evaluate(command: argparse.ArgumentParser) -> None:
         "--rows", nargs="+", default=["all"], help="all, bars, p0, p1, or names with wildcards"
     )
     command.add_argument("--methods", nargs="+", default=["verified"])
-    command.add_argument("--model", help="a .vnr file for coarse and verified (default: built in)")
-    command.add_argument("--paper-model", default="models/small.vnr", help="for mode paper")
+    command.add_argument("--model", help="for mode verified, a .vnr file (default: built in)")
+    command.add_argument(
+        "--paper-model", default="models/small.vnr", help="for modes coarse, paper"
+    )
     command.add_argument("--failures", action="store_true", help="list the pairs that were lost")
     command.add_argument("--run", help="folder that keeps the answers; a second call goes on")
     command.set_defaults(run_command=_evaluate)

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from vnreg_train.evaluate.methods import MODES, EngineMethod, Method
+from vnreg_train.evaluate.pairs import split_shapes
 from vnreg_train.evaluate.peers import PEERS, tuned_peer
 from vnreg_train.evaluate.rows import select_rows
 from vnreg_train.evaluate.run import Pairing, answer_all
@@ -24,7 +25,7 @@ def make_methods(arguments: argparse.Namespace) -> list[Callable[[], Method]]:
     makers: list[Callable[[], Method]] = []
     for mode in MODES:
         if mode in names:
-            path = arguments.paper_model if mode == "paper" else arguments.model
+            path = arguments.model if mode == "verified" else arguments.paper_model
             makers.append(partial(EngineMethod, mode, Path(path) if path else None))
     return makers + [partial(tuned_peer, name) for name in PEERS if name in names]
 
@@ -50,7 +51,8 @@ def evaluate_main(arguments: argparse.Namespace) -> None:
         make_methods(arguments), rows, pairing, folder, arguments.jobs
     ):
         pairs = list(pairing.pairs(row))
-        scores = score(pairs, estimates, groups)
+        shapes = split_shapes(pairing.split, pairing.data) if arguments.failures else None
+        scores = score(pairs, estimates, groups, shapes)
         lost = failure_lines(pairs, scores) if arguments.failures else []
         print("\n".join([line(row.name, name, scores), *lost]), flush=True)
     print(LEGEND)

@@ -101,7 +101,8 @@ def failures(scores: Scores) -> dict[str, int]:
 
     Each pair counts where it fits first. no_pose. near: within NEAR_DEG of a right pose, so the
     refinement lost it. alternative: a right pose was found, refined and listed, but not chosen.
-    ambiguous: none was listed, but the method says that several poses fit. wrong: neither.
+    ambiguous: none was listed, but the method says that several poses fit. wrong: neither. And
+    twins: how many of them all place the shape nearly as a right pose does.
     """
     left = ~scores.symmetric()
     counts = {}
@@ -114,6 +115,7 @@ def failures(scores: Scores) -> dict[str, int]:
     ):
         counts[name] = int((left & which).sum())
         left = left & ~which
+    counts["twins"] = int((scores.twin & ~scores.symmetric()).sum())
     return counts
 
 

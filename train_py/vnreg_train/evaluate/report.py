@@ -12,6 +12,8 @@ from vnreg_train.evaluate.methods import MODES
 from vnreg_train.evaluate.peers import PEERS
 from vnreg_train.evaluate.rows import PAPER_SETTINGS
 from vnreg_train.evaluate.scores import GROSS_DEG, LIMITS
+from vnreg_train.evaluate.twins import NEAR
+from vnreg_train.evaluate.twins import SHARE as TWIN_SHARE
 
 Results = Mapping[str, Any]
 TITLES = {
@@ -243,20 +245,28 @@ def confidence_section(results: Results) -> str:
 
 
 def failures_table(results: Results) -> str:
-    keys = ("near", "alternative", "ambiguous", "wrong", "no_pose")
+    keys = ("near", "alternative", "ambiguous", "wrong", "no_pose", "twins")
     lines = []
     for row, of in results["rows"].items():
         if METHOD in of:
             lost = of[METHOD]["failures"]
-            lines.append([_short(row), str(sum(lost.values())), *(str(lost[key]) for key in keys)])
+            lines.append(
+                [
+                    _short(row),
+                    str(sum(lost[key] for key in keys[:-1])),
+                    *(str(lost[key]) for key in keys),
+                ]
+            )
     note = (
         "Each failure (up to symmetry) counts where it fits first: within "
         f"{NEAR_DEG:g}° of a right pose (lost by the refinement); a right pose among the "
         "alternatives (found, not chosen); called ambiguous without it; wrong and not said so (no "
-        "right pose was found, or it was rejected early); no pose."
+        "right pose was found, or it was rejected early); no pose. *Twins* among all of these: "
+        f"wrong poses that lay {TWIN_SHARE:.0%} of the shape's surface within {NEAR:g} of where "
+        "the right one does, so that only details tell them apart."
     )
     head = ["row", "failures", f"within {NEAR_DEG:g}°", "among alternatives", "ambiguous"]
-    return note + "\n\n" + table([*head, "wrong", "no pose"], lines)
+    return note + "\n\n" + table([*head, "wrong", "no pose", "twins"], lines)
 
 
 def time_table(results: Results) -> str:

@@ -9,7 +9,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from vnreg_train.evaluate.bars import METHOD
 from vnreg_train.evaluate.measures import confidence, measure, nees
+from vnreg_train.evaluate.pairs import split_shapes
 from vnreg_train.evaluate.rows import ROWS, Row
 from vnreg_train.evaluate.run import Pairing, answers_path, read_answers
 from vnreg_train.evaluate.scores import Scores, concatenated, score
@@ -44,7 +46,8 @@ def collect_results(
             methods.setdefault(name, found[0])
             if methods[name] != found[0]:
                 raise ValueError(f"{name}: {row.name} was answered by another version of it")
-            scores = score(pairs, found[1], groups)
+            shapes = split_shapes(pairing.split, pairing.data) if name == METHOD else None
+            scores = score(pairs, found[1], groups, shapes)
             rows.setdefault(row.name, {})[name] = measure(scores)
             scored.setdefault(name, {})[row] = scores
     if not rows:
@@ -106,6 +109,24 @@ def cpu_name() -> str:
 
 
 def write_results(results: dict[str, Any], path: Path) -> None:
-    """As JSON; creates the folder where needed."""
+    """As JSON, a line for each method of a row; creates the folder where needed."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(results, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    path.write_text(_text(_rounded(results), 3) + "\n", encoding="utf-8")
+
+
+def _text(value: Any, levels: int, indent: str = "") -> str:
+    """JSON that opens only so many levels of objects to lines of their own."""
+    if levels == 0 or not isinstance(value, dict) or not value:
+        return json.dumps(value, allow_nan=False)
+    deeper = indent + " "
+    lines = [f"{deeper}{json.dumps(k)}: {_text(v, levels - 1, deeper)}" for k, v in value.items()]
+    return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+
+
+def _rounded(value: Any) -> Any:
+    """Floats to seven significant digits: more is noise in a diff."""
+    if isinstance(value, dict):
+        return {key: _rounded(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_rounded(one) for one in value]
+    return float(f"{value:.7g}") if isinstance(value, float) else value

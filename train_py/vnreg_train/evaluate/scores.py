@@ -11,8 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from vnreg_train.data.mesh import Float64, Int64
 from vnreg_train.data.protocol import Pair, rotation_error_deg, translation_error
+from vnreg_train.data.shapes import ShapeSet
 from vnreg_train.evaluate.estimates import Estimate
 from vnreg_train.evaluate.symmetry import TRIVIAL, SymmetryGroup
+from vnreg_train.evaluate.twins import is_twin
 
 Bools = NDArray[np.bool_]
 LIMITS = ((5.0, 0.2), (5.0, 0.05), (2.0, 0.02))  # degrees, longest sides; the first is the paper's
@@ -35,6 +37,7 @@ class Scores:
     ambiguous: Bools
     right_alternative: Bools  # an alternative is right (first limit, up to symmetry)
     nees: Float64  # NaN without a covariance; of poses that are right up to symmetry
+    twin: Bools  # a wrong pose that places the shape nearly alike (twins.py), where asked for
 
     def __len__(self) -> int:
         return len(self.ms)
@@ -65,26 +68,36 @@ def concatenated(parts: Sequence[Scores]) -> Scores:
 
 
 def score(
-    pairs: Sequence[Pair], estimates: Sequence[Estimate], groups: Mapping[str, SymmetryGroup]
+    pairs: Sequence[Pair],
+    estimates: Sequence[Estimate],
+    groups: Mapping[str, SymmetryGroup],
+    shapes: ShapeSet | None = None,
 ) -> Scores:
-    """Of pairs and a method's answers to them, in the same order; at least one."""
+    """Of pairs and a method's answers to them, in the same order; at least one.
+
+    shapes: the split's, to tell the twins among the wrong poses (30 ms each).
+    """
     rows = [
-        _one(pair, estimate, groups.get(pair.name, TRIVIAL))
+        _one(pair, estimate, groups.get(pair.name, TRIVIAL), shapes)
         for pair, estimate in zip(pairs, estimates, strict=True)
     ]
     return Scores(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def _one(pair: Pair, estimate: Estimate, group: SymmetryGroup) -> tuple[float | int | bool, ...]:
+def _one(
+    pair: Pair, estimate: Estimate, group: SymmetryGroup, shapes: ShapeSet | None
+) -> tuple[float | int | bool, ...]:
     """The fields of Scores, in their order."""
     pose, truth = estimate.T_target_source, pair.T_target_source
     plain = symmetric = (180.0, np.inf)
-    nees = np.nan
+    nees, twin = np.nan, False
     if pose is not None:
         plain = (float(rotation_error_deg(pose, truth)), float(translation_error(pose, truth)))
         symmetric = group.errors(pose, truth)
         if estimate.covariance is not None and _right(symmetric):
             nees = squared_error(pose, group.nearest(pose, truth), estimate.covariance)
+        if shapes is not None and not _right(symmetric):
+            twin = is_twin(shapes.surface[pair.shape], pose, truth)
     return (
         *plain,
         *symmetric,
@@ -96,6 +109,7 @@ def _one(pair: Pair, estimate: Estimate, group: SymmetryGroup) -> tuple[float | 
         estimate.status == "ambiguous",
         any(_right(group.errors(other, truth)) for other in estimate.alternatives),
         nees,
+        twin,
     )
 
 

@@ -45,6 +45,7 @@ def failure_lines(pairs: Sequence[Pair], scores: Scores) -> list[str]:
         f" {scores.symmetric_translation[k]:6.3f}  overlap {scores.overlap[k]:.2f}"
         f"  confidence {scores.confidence[k]:.2f}"
         f"{'  ambiguous' if scores.ambiguous[k] else ''}"
+        f"{'  twin' if scores.twin[k] else ''}"
         f"{'  right alternative' if scores.right_alternative[k] else ''}"
         for k in np.flatnonzero(~scores.symmetric()).tolist()
     ]
