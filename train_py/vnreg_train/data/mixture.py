@@ -136,9 +136,7 @@ def _samples(
     if recipe.uneven:
         half = len(surface) // 2
         order = rng.permutation(len(surface))
-        first, second = (
-            _uneven(surface[part], pool, rng) for part in (order[:half], order[half:])
-        )
+        first, second = (_uneven(surface[part], pool, rng) for part in (order[:half], order[half:]))
         return first, second
     common = int(recipe.shared * pool)
     chosen = rng.choice(len(surface), 2 * pool - common, replace=False)

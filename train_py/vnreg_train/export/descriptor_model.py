@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from vnreg_train.model_file import MetadataValue, read_model, write_model
-from vnreg_train.networks.descriptor import DescriptorNetwork, Neighbourhood
+from vnreg_train.networks.descriptor import Block, DescriptorNetwork, Neighbourhood
 from vnreg_train.networks.descriptor_config import DescriptorConfig
 
 Metadata = dict[str, int | float | bool | str]
@@ -32,9 +32,7 @@ COUNTS = {
 }
 
 
-def descriptor_metadata(
-    config: DescriptorConfig, name: str, points: int, encoded: int
-) -> Metadata:
+def descriptor_metadata(config: DescriptorConfig, name: str, points: int, encoded: int) -> Metadata:
     """The hyper-parameters of docs/design.md, section Tensors of architecture `vnreg`."""
     metadata: Metadata = {key: getattr(config, field) for key, field in COUNTS.items()}
     metadata |= {f"moments.radius.{i}": float(r) for i, r in enumerate(config.moment_radii)}
@@ -82,6 +80,7 @@ def _plain_parameters(network: DescriptorNetwork) -> Iterator[tuple[str, Tensor]
     yield from _neighbourhood("context", network.neighbourhood1)
     for stage, blocks in (("local", network.local_blocks), ("context", network.context_blocks)):
         for index, block in enumerate(blocks):
+            assert isinstance(block, Block)
             yield f"{stage}.block.{index}.direction", block.direction.weight
             yield f"{stage}.block.{index}.linear", block.linear.weight
             if block.pool is not None:
@@ -106,7 +105,10 @@ def _folded_inputs(network: DescriptorNetwork) -> Iterator[tuple[str, Tensor]]:
     """The first layers, which take the input scales in, and the descriptors' lengths."""
     weight = network.scalar0.weight.double() * network.scalar_scale.double()
     yield "point.scalars.weight", weight
-    yield "point.scalars.bias", network.scalar0.bias.double() - weight @ network.scalar_mean.double()
+    yield (
+        "point.scalars.bias",
+        network.scalar0.bias.double() - weight @ network.scalar_mean.double(),
+    )
     yield "point.vectors", network.pre_local.weight.double() * network.local_scale.double()
     yield "context.vectors", network.pre_context.weight.double() * network.context_scale.double()
     yield "lengths", torch.exp(0.5 * network.temperature.double())

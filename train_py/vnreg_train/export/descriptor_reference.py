@@ -1,6 +1,6 @@
 """The network `vnreg` in torch, stage by stage, as docs/design.md names the stages.
 
-What the engine is compared with. Which points are encoded is the engine's choice, so it is an input.
+What the engine is compared with. Which points are encoded is the engine's choice: an input here.
 """
 
 from __future__ import annotations

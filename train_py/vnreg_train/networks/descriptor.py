@@ -57,7 +57,7 @@ class Features(NamedTuple):
 def input_features(
     points: Tensor, mask: Tensor, encoded: int, radii: tuple[float, float, float]
 ) -> Inputs:
-    """Features of the first `encoded` points, from moments over all points (B, N, 3) in the mask."""
+    """Features of the first `encoded` points, from moments over points (B, N, 3) of the mask."""
     centres = points[:, :encoded]
     moments = [radius_moments(points, mask, centres, radius) for radius in radii]
     offsets, covariances, skews = (list(m) for m in zip(*moments, strict=True))
@@ -138,6 +138,11 @@ class Invariants(nn.Module):
 
 class DescriptorNetwork(nn.Module):
     """From input features to descriptors, frames and the global feature of each cloud."""
+
+    local_scale: Tensor
+    context_scale: Tensor
+    scalar_mean: Tensor
+    scalar_scale: Tensor
 
     def __init__(self, config: DescriptorConfig) -> None:
         super().__init__()
@@ -245,6 +250,12 @@ class DescriptorNetwork(nn.Module):
         share = torch.softmax(logit, 1)[:, :, None, None]
         vectors = self.global_linear((n * share).sum(1)).to(points.dtype)
         return vectors + (points.unsqueeze(3) * share).sum(1)
+
+
+def split_pair(features: Features) -> tuple[Features, Features]:
+    """Features of clouds stacked source first, then target -> of the sources, of the targets."""
+    source, target = zip(*(f.chunk(2) for f in features), strict=True)
+    return Features(*source), Features(*target)
 
 
 def unit_frames(frames: Tensor) -> Tensor:

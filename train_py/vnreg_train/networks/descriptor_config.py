@@ -8,7 +8,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class DescriptorConfig:
-    """Widths and radii. Lengths are in network coordinates: the larger cloud has r.m.s. radius 1."""
+    """Widths and radii. Lengths are in network coordinates: the larger r.m.s. radius is 1."""
 
     channels: int = 32  # C: vector channels
     scalars: int = 48  # H: scalar channels
@@ -30,9 +30,10 @@ class DescriptorConfig:
         unknown = sorted(set(values) - known)
         if unknown:
             raise ValueError(f"[network]: unknown keys {unknown}; known: {sorted(known)}")
-        return DescriptorConfig(
-            **{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
-        )
+        listed: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in values.items()
+        }
+        return DescriptorConfig(**listed)
 
     def to_dict(self) -> dict[str, Any]:
         """The inverse of `from_dict`."""

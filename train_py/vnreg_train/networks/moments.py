@@ -1,7 +1,7 @@
 """What a point sees of its surroundings: moments within a few radii.
 
-With weights w = (1 - d²/r²)²₊ of the points at distance d, divided by their sum, they depend neither
-on the number of points nor on their order, vary smoothly, and need no nearest neighbours.
+With weights w = (1 - d²/r²)²₊ of the points at distance d, divided by their sum, they depend
+neither on the number of points nor on their order, vary smoothly, and need no nearest neighbours.
 """
 
 from __future__ import annotations

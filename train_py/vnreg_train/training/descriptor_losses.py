@@ -65,9 +65,14 @@ def determinacy(frames: Tensor) -> Tensor:
 
 
 def descriptor_losses(
-    source: Features, target: Features, x: Tensor, y: Tensor, shift: Tensor, weights: dict[str, float]
+    source: Features,
+    target: Features,
+    x: Tensor,
+    y: Tensor,
+    shift: Tensor,
+    weights: dict[str, float],
 ) -> tuple[Tensor, Figures]:
-    """The weighted sum and its terms. x, y (B, E, 3) about their centroids; y ~ x + shift (B, 3)."""
+    """Weighted sum and terms. x, y (B, E, 3) about their centroids; y ~ x + shift (B, 3)."""
     distance, worth = soft_targets(x + shift.unsqueeze(1), y)
     local = source.local @ target.local.transpose(1, 2)
     context = source.context @ target.context.transpose(1, 2)

@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from vnreg_train.data.mixture import MixtureSampler, PaddedPairs
 from vnreg_train.data.shapes import ShapeSet
-from vnreg_train.networks.descriptor import DescriptorNetwork, Features, input_features
+from vnreg_train.networks.descriptor import DescriptorNetwork, input_features, split_pair
 from vnreg_train.training.checkpoint import (
     restore_training_state,
     save_checkpoint,
@@ -50,9 +50,7 @@ def network_batch(pairs: PaddedPairs) -> DescriptorBatch:
     scale = np.maximum(radius[:half], radius[half:])
     clouds /= np.tile(scale, 2)[:, None, None]
     shift = (centroid[:half] - centroid[half:]) / scale[:, None]
-    points, weight, shift = (
-        torch.from_numpy(a.astype(np.float32)) for a in (clouds, mask, shift)
-    )
+    points, weight, shift = (torch.from_numpy(a.astype(np.float32)) for a in (clouds, mask, shift))
     return DescriptorBatch(points, weight, shift)
 
 
@@ -115,7 +113,7 @@ class DescriptorTrainer:
         centres = points[:, :encoded]
         with torch.autocast("cpu", torch.bfloat16, enabled=config.optimisation.bfloat16):
             features = self.network(centres, inputs)
-        source, target = (Features(*side) for side in zip(*(f.chunk(2) for f in features)))
+        source, target = split_pair(features)
         x, y = centres.chunk(2)
         return descriptor_losses(source, target, x, y, shift, config.optimisation.weights)
 
@@ -157,9 +155,7 @@ class DescriptorTrainer:
         writer = SummaryWriter(str(self.run_folder / "tensorboard"))
         started = last_saved = time.monotonic()
         first, window = self.step, dict[str, float]()
-        bar = tqdm(
-            total=settings.steps, initial=first, disable=not progress, mininterval=10.0
-        )
+        bar = tqdm(total=settings.steps, initial=first, disable=not progress, mininterval=10.0)
         while self.step < settings.steps:
             batch = network_batch(self.sampler.batch(self.step))
             for name, value in self.train_step(batch).items():

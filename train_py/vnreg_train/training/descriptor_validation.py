@@ -12,7 +12,12 @@ from torch import Tensor
 from vnreg_train.data.mixture import MixtureSampler
 from vnreg_train.data.shapes import ShapeSet
 from vnreg_train.networks.coarse import procrustes
-from vnreg_train.networks.descriptor import DescriptorNetwork, Features, input_features
+from vnreg_train.networks.descriptor import (
+    DescriptorNetwork,
+    Features,
+    input_features,
+    split_pair,
+)
 from vnreg_train.training.descriptor_losses import MATCH_RADIUS
 from vnreg_train.training.descriptor_train import network_batch
 
@@ -72,7 +77,7 @@ def validate(
         inputs = input_features(batch.points, batch.mask, encoded, network.config.moment_radii)
         centres = batch.points[:, :encoded]
         features = network(centres, inputs)
-        source, target = (Features(*side) for side in zip(*(f.chunk(2) for f in features), strict=True))
+        source, target = split_pair(features)
         x, y = centres.chunk(2)
         x = x + batch.shift.unsqueeze(1)
         rotation, _ = procrustes(
@@ -80,8 +85,8 @@ def validate(
         )
         coarse = angle_deg(rotation)
         for k in range(len(x)):
-            one = (Features(*(f[k] for f in side)) for side in (source, target))
-            figures = match_figures(*one, x[k], y[k])
+            one, other = (Features(*(f[k] for f in side)) for side in (source, target))
+            figures = match_figures(one, other, x[k], y[k])
             rows.append(figures | {"coarse_15": float(coarse[k] < 15)})
     names = sorted({name for row in rows for name in row})
     return {name: float(np.mean([row[name] for row in rows if name in row])) for name in names}

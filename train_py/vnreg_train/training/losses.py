@@ -36,9 +36,9 @@ def consistency_loss(source: Tensor, target: Tensor) -> Tensor:
     trace = spread.diagonal(dim1=1, dim2=2).sum(1)
     identity = torch.eye(3, dtype=source.dtype, device=source.device)
     spread = spread + (1e-4 * trace[:, None, None] + 1e-12) * identity
-    whitened = torch.linalg.solve_triangular(
-        torch.linalg.cholesky(spread), source - target, upper=False
-    )
+    # Features that are not finite give a loss that is not: cholesky() would stop the training.
+    factor = torch.linalg.cholesky_ex(spread).L
+    whitened = torch.linalg.solve_triangular(factor, source - target, upper=False)
     return whitened.square().mean((1, 2)).mean()
 
 
