@@ -111,7 +111,7 @@ def test_the_page_tells_the_figures(run: Path, pairing: Pairing, tmp_path: Path)
     assert "| noise_0.01 | 1 | 0 | 1 | 0 | 0 | 0 | 0 |" in page  # the failure, among alternatives
     assert "| noise_0.01 | Open3D FPFH + FGR + ICP | 4 | 1 |" in page
     assert "| Open3D FPFH + FGR + ICP | open3d 1.0 | radius 0.1 |" in page
-    assert "(overlap.svg)" in page and "6 pairs a row" in page
+    assert "(results/overlap.svg)" in page and "6 pairs a row" in page
 
 
 def test_every_table_has_the_columns_of_its_head(run: Path, pairing: Pairing) -> None:

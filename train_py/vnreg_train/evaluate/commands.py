@@ -105,5 +105,5 @@ def report_main(arguments: argparse.Namespace) -> None:
     page = Path(arguments.out)
     figures = page.with_suffix("")
     write_results(results, figures / "results.json")
-    plots = [(caption, f"{figures.name}/{name}") for caption, name in draw_plots(results, figures)]
-    page.write_text(markdown(results, plots), encoding="utf-8")
+    plots = draw_plots(results, figures)
+    page.write_text(markdown(results, plots, figures.name), encoding="utf-8")

@@ -34,12 +34,12 @@ PAPER_RECALL = {
 }
 
 
-def markdown(results: Results, plots: Sequence[tuple[str, str]]) -> str:
-    """The whole page; plots as (caption, path relative to the page)."""
+def markdown(results: Results, plots: Sequence[tuple[str, str]], folder: str = "results") -> str:
+    """The whole page; plots as (caption, file name), they and results.json in `folder` beside it."""
     parts = [
         "# Results",
         "Written by `make evaluate` from one run; the figures behind it, with seeds and versions: "
-        "[results.json](results/results.json).",
+        f"[results.json]({folder}/results.json).",
         how_measured(results),
         "## The bars",
         bars_table(results),
@@ -49,7 +49,7 @@ def markdown(results: Results, plots: Sequence[tuple[str, str]]) -> str:
         p1_section(results),
         "## Recall against overlap",
         overlap_table(results),
-        *(f"![{caption}]({path})" for caption, path in plots),
+        *(f"![{caption}]({folder}/{name})" for caption, name in plots),
         "## Confidence and covariance",
         confidence_section(results),
         "## Where the failures of mode verified come from",
