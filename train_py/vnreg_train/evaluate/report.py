@@ -35,7 +35,7 @@ PAPER_RECALL = {
 
 
 def markdown(results: Results, plots: Sequence[tuple[str, str]], folder: str = "results") -> str:
-    """The whole page; plots as (caption, file name), they and results.json in `folder` beside it."""
+    """The whole page; plots as (caption, file name) lie, like results.json, in `folder`."""
     parts = [
         "# Results",
         "Written by `make evaluate` from one run; the figures behind it, with seeds and versions: "
