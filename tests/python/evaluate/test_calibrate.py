@@ -35,7 +35,9 @@ def test_a_fit_ranks_and_is_calibrated_on_other_shapes_too() -> None:
     evidence = rng.uniform(0, 1, (4000, 2)) * [1.0, 0.3]
     right = rng.uniform(size=4000) < sigmoid(-6 + evidence @ [12.0, -4.0])
     found = fit_calibration(
-        Sample(("fit", "gap"), evidence, right, rng.integers(0, 80, 4000)), "verified"
+        Sample(("fit", "gap"), evidence, right, rng.integers(0, 80, 4000), rng.chisquare(6, 4000)),
+        "verified",
+        factor=2.0,
     )
     assert found.bias == pytest.approx(-6, rel=0.2)
     assert found.weights["fit"] == pytest.approx(12, rel=0.2)
@@ -46,7 +48,9 @@ def test_a_fit_ranks_and_is_calibrated_on_other_shapes_too() -> None:
         "calibration.verified.bias",
         "calibration.verified.fit",
         "calibration.verified.gap",
+        "calibration.verified.covariance",
     ]
+    assert found.covariance == pytest.approx(2, rel=0.05)  # it was right already
 
 
 def test_every_row_and_seed_is_a_part_of_the_sample(
@@ -63,6 +67,8 @@ def test_every_row_and_seed_is_a_part_of_the_sample(
     np.testing.assert_array_equal(sample.right.reshape(6, 4), [[1, 1, 0, 1]] * 6)
     np.testing.assert_array_equal(sample.evidence[:4, 0], [0.8, 0.8, 0.1, 0.8])
     np.testing.assert_array_equal(sample.shape[:4], [0, 1, 2, 3])
+    np.testing.assert_array_equal(np.isnan(sample.nees[:12]), [1] * 12)  # P0 comes first
+    np.testing.assert_array_equal(np.isnan(sample.nees[12:16]), [0, 0, 1, 0])
 
 
 def test_a_method_without_evidence_cannot_be_calibrated(

@@ -16,7 +16,7 @@ class Estimate:
 
     T_target_source: (4, 4), None without a pose. ms: processor time of the call on one thread.
     The rest is what this engine tells and peers do not. covariance: (6, 6), rotation vector in
-    radians, then translation: T_true = exp([w, v]) T_target_source.
+    radians, then translation: T_true = [exp(w) v; 0 1] T_target_source.
     """
 
     T_target_source: Float64 | None

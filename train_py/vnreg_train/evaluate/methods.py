@@ -60,14 +60,14 @@ class EngineMethod:
         start = time.process_time()
         result = self._registrar.align(pair.source, pair.target)
         ms = 1000 * (time.process_time() - start)
-        covariance = getattr(result, "covariance", None)
+        covariance = np.asarray(getattr(result, "covariance", np.nan))
         return Estimate(
             T_target_source=result.T_target_source if result.has_pose else None,
             ms=ms,
             status=result.status,
             confidence=result.confidence,
             evidence=_evidence(result, self.mode),
-            covariance=None if covariance is None else np.asarray(covariance),
+            covariance=covariance if np.isfinite(covariance).all() else None,
             alternatives=tuple(a.T_target_source for a in result.alternatives),
         )
 
