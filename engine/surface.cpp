@@ -21,6 +21,10 @@ constexpr float smallest_spacing = 0.01f;
 constexpr double line_threshold = 1e-8;
 // Below it, its reciprocal leaves the range of float32.
 constexpr double smallest_radius = 1e-30;
+// R.m.s. of a normal distribution, per median of its absolute values.
+constexpr float normal_from_median = 1.4826f;
+// Of the progressive order: enough to see where a surface ends.
+constexpr Index extent_points = 512;
 // The grid is exact out to where the widest comparison ends.
 constexpr float reach_in_spacings = 6.0f;
 
@@ -64,7 +68,15 @@ Eigen::Vector3d point_at(const Surface& s, std::size_t i) noexcept {
   return Eigen::Vector3f(s.x[i], s.y[i], s.z[i]).cast<double>();
 }
 
-/// The direction in which the point's neighbours vary least.
+/// Lower median. Reorders the values.
+float median(float* values, Index count) noexcept {
+  float* middle = values + (count - 1) / 2;
+  std::nth_element(values, middle, values + count);
+  return *middle;
+}
+
+/// The direction in which the point's neighbours vary least, and the point's place in the plane
+/// across it through their centroid.
 void fit_plane(Index i, Surface& s) noexcept {
   const auto own = static_cast<std::size_t>(i);
   const std::uint16_t* neighbours = s.neighbours.data() + surface_neighbours * i;
@@ -87,6 +99,21 @@ void fit_plane(Index i, Surface& s) noexcept {
   s.normal_y[own] = normal.y();
   s.normal_z[own] = normal.z();
   s.spread_squared[own] = static_cast<float>(farthest);
+  const Eigen::Vector3f centroid = (sum / static_cast<double>(surface_neighbours)).cast<float>();
+  const float height = -normal.dot(centroid);
+  s.height[own] = std::abs(height);
+  s.flat_x[own] = s.x[own] - height * normal.x();
+  s.flat_y[own] = s.y[own] - height * normal.y();
+  s.flat_z[own] = s.z[own] - height * normal.z();
+}
+
+/// Moves the points into their planes.
+void flatten(Surface& s) noexcept {
+  s.noise = normal_from_median * median(s.height.data(), s.count);
+  std::swap(s.x, s.flat_x);
+  std::swap(s.y, s.flat_y);
+  std::swap(s.z, s.flat_z);
+  measure_extents(s.coordinates(), std::min(s.count, extent_points), s.height.data(), s.extents);
 }
 
 void fit_planes(Surface& s, Index first_leaf, Index last_leaf,
@@ -97,13 +124,6 @@ void fit_planes(Surface& s, Index first_leaf, Index last_leaf,
   for (Index p = first_leaf * SpatialIndex::leaf_size; p < last; ++p) {
     fit_plane(static_cast<Index>(s.index.original()[p]), s);
   }
-}
-
-/// Lower median. Reorders the values.
-float median(float* values, Index count) noexcept {
-  float* middle = values + (count - 1) / 2;
-  std::nth_element(values, middle, values + count);
-  return *middle;
 }
 
 bool is_line(const Surface& s) noexcept {
@@ -138,8 +158,8 @@ void for_each_chunk(Workspace& w, Index chunk, const Total& total, const Task& t
 
 Surface::Surface(Index max_points) : index(std::min(max_points, most_surface_points)) {
   const auto points = static_cast<std::size_t>(std::min(max_points, most_surface_points));
-  for (kernels::Floats* array :
-       {&x, &y, &z, &normal_x, &normal_y, &normal_z, &spread_squared}) {
+  for (kernels::Floats* array : {&x, &y, &z, &normal_x, &normal_y, &normal_z, &spread_squared,
+                                 &flat_x, &flat_y, &flat_z, &height}) {
     array->resize(points);
   }
   neighbours.resize(points * static_cast<std::size_t>(surface_neighbours));
@@ -170,12 +190,14 @@ bool build_surfaces(Workspace& w) noexcept {
   }
   w.verified.spacing = spacing;
   const float reach = reach_in_spacings * spacing;
-  for (Index side = 0; side < 2; ++side) surface[side].grid.place(surface[side].index, reach, reach);
+  for (Index side = 0; side < 2; ++side)
+    surface[side].grid.place(surface[side].index, reach, reach);
   for_each_chunk(
       w, blocks_per_task, [&](Index side) { return surface[side].grid.blocks(); },
       [&](Index side, Index first, Index last, kernels::NeighbourScratch& scratch) {
         surface[side].grid.fill(surface[side].index, first, last, scratch);
       });
+  parallel_for(w.threads, 2, [&](Index side, int) { flatten(surface[side]); });
   return true;
 }
 

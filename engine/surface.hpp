@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/cloud.hpp"
+#include "engine/half_spaces.hpp"
 #include "kernels/nearest_grid.hpp"
 #include "kernels/neighbours.hpp"
 
@@ -19,7 +20,9 @@ inline constexpr Index most_surface_points = 2048;
 inline constexpr Index surface_neighbours = 14;
 
 /// Lengths are in units of the larger r.m.s. radius of the pair. The points are in progressive
-/// order: the first n of them are spread over the cloud, for any n.
+/// order: the first n of them are spread over the cloud, for any n. They lie where the points given
+/// meet their tangent planes: that takes most of the noise out of them, and what it takes off edges
+/// it takes off in both clouds.
 struct Surface {
   Index count = 0;
   kernels::Floats x, y, z;
@@ -29,8 +32,14 @@ struct Surface {
   /// Distance between neighbouring points: that to the k-th neighbour over sqrt(k), median. Unlike
   /// the distance to the nearest, it is not 0 when a cloud holds every point twice.
   float spacing = 0;
-  kernels::SpatialIndex index;
+  /// R.m.s. distance of the points given from their planes, by the median: noise, and curvature.
+  float noise = 0;
+  Extents extents{};
+  kernels::SpatialIndex index;  // of the points given
   kernels::NearestGrid grid;
+
+  kernels::Floats flat_x, flat_y, flat_z;  // while the planes are fitted
+  kernels::Floats height;                  // of the points given over their planes
 
   Surface() = default;
   explicit Surface(Index max_points);

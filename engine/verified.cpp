@@ -80,8 +80,9 @@ Index compare_hypotheses(Workspace& w) noexcept {
   constexpr Index per_task = 16;
   parallel_for(w.threads, (compared + per_task - 1) / per_task, [&](Index task, int) {
     for (Index i = task * per_task; i < std::min((task + 1) * per_task, compared); ++i) {
-      all[i].score = two_sided_score(all[i].motion, v.surface, compared_points,
-                                     compared_tolerance * v.spacing, Search::cell);
+      all[i].score = two_sided_fit(all[i].motion, v.surface, compared_points,
+                                   compared_tolerance * v.spacing, Search::cell)
+                         .score();
     }
   });
   std::sort(all, all + compared, order);
@@ -111,7 +112,7 @@ Index keep_distinct(ScoredPose* poses, Index count, Index most, double degrees,
                     float radii) noexcept {
   const float cosine = cosine_of(degrees);
   std::sort(poses, poses + count,
-                   [](const ScoredPose& a, const ScoredPose& b) { return a.score > b.score; });
+            [](const ScoredPose& a, const ScoredPose& b) { return a.score > b.score; });
   Index kept = 0;
   for (Index i = 0; i < count && kept < most; ++i) {
     const Motion motion = to_motion(poses[i].transform);
@@ -128,7 +129,8 @@ Index keep_distinct(ScoredPose* poses, Index count, Index most, double degrees,
 void refine_if_better(std::span<const RefineStage> stages, Index points, float tolerance,
                       Search search, const VerifiedWorkspace& v, ScoredPose& pose) noexcept {
   const auto score_of = [&](const RigidTransform& transform) {
-    return two_sided_score(to_motion(transform), v.surface, points, tolerance * v.spacing, search);
+    return two_sided_fit(to_motion(transform), v.surface, points, tolerance * v.spacing, search)
+        .score();
   };
   RigidTransform refined = pose.transform;
   for (const RefineStage& stage : stages) {
@@ -158,15 +160,15 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
   }
   const Index compared = compare_hypotheses(w);
   count = add_distinct(v.hypotheses.data(), compared, count, v.poses);
-  parallel_for(w.threads, count, [&](Index i, int) { 
+  parallel_for(w.threads, count, [&](Index i, int) {
     refine_if_better(first_refinements, second_points, second_tolerance, Search::cell, v, poses[i]);
-   });
+  });
   count = keep_distinct(poses, count, final_poses, final_degrees, final_radii);
-  parallel_for(w.threads, count, [&](Index i, int) { 
+  parallel_for(w.threads, count, [&](Index i, int) {
     refine_if_better(final_refinements, everything, final_tolerance, Search::exact, v, poses[i]);
-   });
-  count = keep_distinct(poses, count, VerifiedPoses::capacity, alternative_degrees,
-                        alternative_radii);
+  });
+  count =
+      keep_distinct(poses, count, VerifiedPoses::capacity, alternative_degrees, alternative_radii);
   for (Index i = 0; i < count; ++i) {
     if (poses[i].score < alternative_share * poses[0].score) break;
     result.pose[result.count++] = {in_units(poses[i].transform, v.radius), poses[i].score};

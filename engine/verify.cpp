@@ -9,9 +9,9 @@ namespace {
 // in part, but not most of the first 16.
 constexpr Index first_probes = 16;
 constexpr float first_probes_least = 4.0f;
-// A part of the score goes to points that coincide. Where both clouds hold the same points, it tells
-// their pose from one that folds the surface onto another part of itself; where they are samples of
-// their own, no pose gets it.
+// A part of the score goes to points that coincide. Where both clouds hold the same points, it
+// tells their pose from one that folds the surface onto another part of itself; where they are
+// samples of their own, no pose gets it.
 constexpr float coincidence_share = 0.5f;
 constexpr float coincidence_tolerance = 0.1f;  // of the other tolerance
 // Steps from a cell's point to the nearest one; the first is nearly always enough.
@@ -82,28 +82,55 @@ inline float kernel(float squared) noexcept {
   return positive * positive;
 }
 
-/// The mean over the first points of `moving`.
-float one_sided_score(const Motion& motion, const Surface& moving, const Surface& fixed,
-                      Index points, float tolerance, Search search) noexcept {
-  const Index total = std::min(points, moving.count);
-  const float per_limit = 1 / (9 * tolerance * tolerance);
+/// Moved points without a match.
+struct Unmatched {
+  Index count = 0;
+  alignas(64) float x[most_surface_points], y[most_surface_points], z[most_surface_points];
+
+  void add(const Matches& m, float limit_squared) noexcept {
+    for (Index i = 0; i < m.count; ++i) {
+      // Written always, kept if unmatched: no branch that the data decides.
+      x[count] = m.x[i];
+      y[count] = m.y[i];
+      z[count] = m.z[i];
+      count += m.squared[i] > limit_squared ? 1 : 0;
+    }
+  }
+};
+
+float sum_of_agreement(const Matches& m, float per_limit) noexcept {
   const float per_coincidence = per_limit / (coincidence_tolerance * coincidence_tolerance);
   float sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (Index i = 0; i < m.count; ++i) {
+    const float near = kernel(m.squared[i] * per_limit);
+    const float coincident = kernel(m.squared[i] * per_coincidence);
+    sum += ((1 - coincidence_share) * near + coincidence_share * coincident) * m.agreement[i];
+  }
+  return sum;
+}
+
+/// Of the first points of `moving`.
+Fit one_sided_fit(const Motion& motion, const Surface& moving, const Surface& fixed, Index points,
+                  float tolerance, Search search) noexcept {
+  const Index total = std::min(points, moving.count);
+  const float limit = 9 * tolerance * tolerance;
   Matches matches;
+  Unmatched unmatched;
+  Fit fit;
   for (Index first = 0; first < total; first += Matches::capacity) {
     match_points(motion, moving, first, std::min(Matches::capacity, total - first), fixed, search,
                  matches);
-    float part = 0;
-#pragma omp simd reduction(+ : part)
-    for (Index i = 0; i < matches.count; ++i) {
-      const float near = kernel(matches.squared[i] * per_limit);
-      const float coincident = kernel(matches.squared[i] * per_coincidence);
-      part += ((1 - coincidence_share) * near + coincidence_share * coincident) *
-              matches.agreement[i];
-    }
-    sum += part;
+    fit.agreement += sum_of_agreement(matches, 1 / limit);
+    unmatched.add(matches, limit);
   }
-  return sum / static_cast<float>(total);
+  const float per_point = 1 / static_cast<float>(total);
+  fit.agreement *= per_point;
+  fit.unmatched = static_cast<float>(unmatched.count) * per_point;
+  fit.beyond = static_cast<float>(count_beyond({unmatched.x, unmatched.y, unmatched.z},
+                                               unmatched.count, fixed.extents)) *
+               per_point;
+  return fit;
 }
 
 }  // namespace
@@ -124,11 +151,12 @@ void match_points(const Motion& motion, const Surface& moving, Index first, Inde
   compare(motion, moving, first, out);
 }
 
-float two_sided_score(const Motion& motion, const Surface surface[2], Index points, float tolerance,
-                      Search search) noexcept {
-  return (one_sided_score(motion, surface[0], surface[1], points, tolerance, search) +
-          one_sided_score(inverse(motion), surface[1], surface[0], points, tolerance, search)) /
-         2;
+Fit two_sided_fit(const Motion& motion, const Surface surface[2], Index points, float tolerance,
+                  Search search) noexcept {
+  const Fit a = one_sided_fit(motion, surface[0], surface[1], points, tolerance, search);
+  const Fit b = one_sided_fit(inverse(motion), surface[1], surface[0], points, tolerance, search);
+  return {(a.agreement + b.agreement) / 2, (a.unmatched + b.unmatched) / 2,
+          (a.beyond + b.beyond) / 2};
 }
 
 float probe(const Motion& motion, const Surface surface[2], float tolerance) noexcept {

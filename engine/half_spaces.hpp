@@ -1,0 +1,29 @@
+// Where a cloud ends: its extent along fixed directions over the sphere. A cloud that shows a part
+// of an object, cut off by a crop or by the edge of a view, leaves the rest of it in a half-space;
+// points of the other cloud that lie there contradict nothing.
+#pragma once
+
+#include <array>
+
+#include "kernels/packets.hpp"
+#include "kernels/spatial_index.hpp"
+
+namespace vnreg::detail {
+
+using kernels::Index;
+
+/// Directions over the sphere, 20 degrees apart. A multiple of the SIMD width.
+inline constexpr Index half_space_directions = 96;
+
+using Extents = std::array<float, static_cast<std::size_t>(half_space_directions)>;
+
+/// Along each direction, the extent beyond which few of the points lie (1 in 80: outliers and noise
+/// should not move it). `projections`: room for `count` numbers.
+void measure_extents(const kernels::Coordinates& points, Index count, float* projections,
+                     Extents& extents) noexcept;
+
+/// The largest number of the given points that lie beyond the extent along one direction.
+Index count_beyond(const kernels::Coordinates& points, Index count,
+                   const Extents& extents) noexcept;
+
+}  // namespace vnreg::detail
