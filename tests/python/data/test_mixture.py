@@ -121,3 +121,12 @@ def test_what_cannot_be_is_refused(spheres: ShapeSet) -> None:
         MixtureSampler(spheres, N, 4, {"clean": 0.0}, 0)
     with pytest.raises(ValueError, match="per shape"):
         MixtureSampler(spheres, 16 * N, 4, {"clean": 1.0}, 0)
+
+
+def test_the_last_batches_leave_the_proportions_as_they_are(spheres: ShapeSet) -> None:
+    sampler = MixtureSampler(spheres, N, 8, {"clean": 1.0}, 0, anisotropic_batches=1)
+    first, later = (
+        np.array([np.abs(np.linalg.norm(s, axis=1) - 0.5).max() for s, _ in clouds(made)])
+        for made in (sampler.batch(0), sampler.batch(1))
+    )
+    assert (first > 0.01).any() and (later < 1e-5).all()

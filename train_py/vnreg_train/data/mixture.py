@@ -64,10 +64,19 @@ class PaddedPairs:
 
 
 class MixtureSampler:
-    """Batch i is a pure function of (seed, i). points: N, the most a cloud has."""
+    """Batch i is a pure function of (seed, i). points: N, the most a cloud has.
+
+    anisotropic_batches: the first so many batches change the shapes' proportions; None: all do.
+    """
 
     def __init__(
-        self, shapes: ShapeSet, points: int, batch: int, mixture: Mapping[str, float], seed: int
+        self,
+        shapes: ShapeSet,
+        points: int,
+        batch: int,
+        mixture: Mapping[str, float],
+        seed: int,
+        anisotropic_batches: int | None = None,
     ) -> None:
         unknown = sorted(set(mixture) - set(RECIPES))
         if unknown:
@@ -80,14 +89,17 @@ class MixtureSampler:
         self.shapes, self.points, self.batch_size, self.seed = shapes, points, batch, seed
         self._recipes = [RECIPES[name] for name in mixture]
         self._chances = weights / weights.sum()
+        self._anisotropic_batches = anisotropic_batches
 
     def batch(self, index: int) -> PaddedPairs:
         """Batch number `index`."""
         rng = np.random.default_rng(stable_seed("mixture batch", self.seed, index))
         rows = rng.choice(len(self.shapes), self.batch_size, replace=False)
         chosen = rng.choice(len(self._recipes), self.batch_size, p=self._chances)
+        end = self._anisotropic_batches
+        chance = ANISOTROPIC_CHANCE if end is None or index < end else 0.0
         pairs = [
-            self._pair(self.shapes.surface[row], self._recipes[recipe], rng)
+            self._pair(self.shapes.surface[row], self._recipes[recipe], chance, rng)
             for row, recipe in zip(rows, chosen, strict=True)
         ]
         sides = list(zip(*pairs, strict=True))
@@ -101,14 +113,14 @@ class MixtureSampler:
         return padded
 
     def _pair(
-        self, surface: Float32, recipe: Recipe, rng: np.random.Generator
+        self, surface: Float32, recipe: Recipe, anisotropic: float, rng: np.random.Generator
     ) -> tuple[Float64, Float64]:
         # Half of the crops keep all points they may hold, as a scanner of fixed density would not.
         fill = rng.uniform() if rng.random() < 0.5 else 0.0
         pool = int(self.points / recipe.keep**fill)
         thin = int(rng.integers(2)) if recipe.sparse else None
         sigma = rng.uniform(*recipe.sigma)
-        scale = _augmentation(rng)
+        scale = _augmentation(anisotropic, rng)
         clouds = _samples(surface, pool, recipe, rng)
         first, second = (
             _finished(
@@ -119,10 +131,10 @@ class MixtureSampler:
         return first, second
 
 
-def _augmentation(rng: np.random.Generator) -> Float64:
+def _augmentation(anisotropic: float, rng: np.random.Generator) -> Float64:
     """Factor per axis (3,): random proportions, and mirror images, which are new shapes."""
     scale = np.ones(3)
-    if rng.random() < ANISOTROPIC_CHANCE:
+    if rng.random() < anisotropic:
         scale = rng.uniform(*ANISOTROPIC_RANGE, 3)
     if rng.random() < MIRROR_CHANCE:
         scale[0] = -scale[0]

@@ -22,6 +22,8 @@ class MixtureConfig:
     folder: str = "data/furniture"
     points: int = 1024  # the most a cloud has
     encoded: int = 384  # of them, those the network describes; every cloud must have as many
+    # Share of the steps in which shapes get random proportions: the last ones see them as they are.
+    anisotropic_share: float = 1.0
     mixture: dict[str, float] = field(default_factory=lambda: {"partial_75": 1.0})
 
 

@@ -78,7 +78,12 @@ class DescriptorTrainer:
             cycle_momentum=False,
         )
         self.sampler = MixtureSampler(
-            shapes, config.data.points, settings.batch, config.data.mixture, config.seed
+            shapes,
+            config.data.points,
+            settings.batch,
+            config.data.mixture,
+            config.seed,
+            anisotropic_batches=int(config.data.anisotropic_share * settings.steps),
         )
         compiled = config.compile
         self._losses = torch.compile(self._forward, dynamic=False) if compiled else self._forward
@@ -154,21 +159,21 @@ class DescriptorTrainer:
         settings = self.config.optimisation
         writer = SummaryWriter(str(self.run_folder / "tensorboard"))
         started = last_saved = time.monotonic()
-        first, window = self.step, dict[str, float]()
+        first, window = self.step, list[dict[str, float]]()
         bar = tqdm(total=settings.steps, initial=first, disable=not progress, mininterval=10.0)
         while self.step < settings.steps:
             batch = network_batch(self.sampler.batch(self.step))
-            for name, value in self.train_step(batch).items():
-                window[name] = window.get(name, 0.0) + value / LOG_EVERY
+            window.append(self.train_step(batch))
             bar.update()
             now = time.monotonic()
             if self.step % LOG_EVERY == 0:
                 pairs = (self.step - first) * settings.batch / (now - started)
-                figures = window | {"pairs_per_second": pairs, "skipped": self.skipped}
+                figures = {k: float(np.mean([f[k] for f in window])) for k in window[0]}
+                figures |= {"pairs_per_second": pairs, "skipped": self.skipped}
                 for name, value in figures.items():
                     writer.add_scalar(name, value, self.step)
                 bar.set_postfix({k: f"{v:.3g}" for k, v in figures.items()})
-                window = {}
+                window = []
             if now - last_saved > 60 * self.config.checkpoint_minutes:
                 self.save()
                 last_saved = now

@@ -23,6 +23,7 @@ from vnreg_train.training.descriptor_train import network_batch
 
 TOP = 320  # matches that the engine would look at
 ENCODED = 512
+GOOD_DEG, GOOD_SHIFT = 15.0, 0.2  # a pose that refinement brings home
 PAIRS = 16  # at once
 
 
@@ -55,24 +56,55 @@ def match_figures(source: Features, target: Features, x: Tensor, y: Tensor) -> d
         figures[f"inliers_{name}"] = float(right.float().mean())
         if name == "sum":
             figures["inliers_first_64"] = float(right[:64].float().mean())
-            rows, columns = top[right], partner[top][right]
+            figures |= pose_figures(source, target, top, partner[top], x, y, right)
+    return figures
+
+
+def pose_figures(
+    source: Features,
+    target: Features,
+    rows: Tensor,
+    columns: Tensor,
+    x: Tensor,
+    y: Tensor,
+    right: Tensor,
+) -> dict[str, float]:
+    """What the poses are worth that single matches (rows, columns) propose by their frames.
+
+    Per kind of frames: the share within 30 degrees where the match is right, whether any pose of
+    all matches is good (15 degrees, and the centroid of the source within 0.2), and of the first 64.
+    """
+    figures = {}
+    any_good = torch.zeros(len(rows), dtype=torch.bool)
     for name in ("frames_local", "frames_context"):
-        a, b = getattr(source, name)[rows], getattr(target, name)[columns]
-        if len(a):
-            figures[f"{name}_30"] = float((angle_deg(frame_rotation(a, b)) < 30).float().mean())
+        rotation = frame_rotation(getattr(source, name)[rows], getattr(target, name)[columns])
+        angle = angle_deg(rotation)
+        if right.any():
+            figures[f"{name}_30"] = float((angle[right] < 30).float().mean())
+        centre = x.double().mean(0)
+        offset = (rotation @ (centre - x[rows].double()).unsqueeze(2)).squeeze(2)
+        placed = (y[columns].double() + offset - centre).norm(dim=1)
+        any_good |= (angle < GOOD_DEG) & (placed < GOOD_SHIFT)
+    figures["proposed"] = float(any_good.any())
+    figures["proposed_first_64"] = float(any_good[:64].any())
+    figures["good_share"] = float(any_good.float().mean())
     return figures
 
 
 @torch.no_grad()
 def validate(
-    network: DescriptorNetwork, shapes: ShapeSet, recipe: str, points: int = 1024
+    network: DescriptorNetwork,
+    shapes: ShapeSet,
+    recipe: str,
+    points: int = 1024,
+    most_encoded: int = ENCODED,
 ) -> dict[str, float]:
     """Mean figures over the shapes, each in one pair of the recipe."""
     sampler = MixtureSampler(shapes, points, min(PAIRS, len(shapes)), {recipe: 1.0}, seed=7)
     rows: list[dict[str, float]] = []
     for index in range(len(shapes) // sampler.batch_size):
         pairs = sampler.batch(index)
-        encoded = min(ENCODED, int(pairs.source_count.min()), int(pairs.target_count.min()))
+        encoded = min(most_encoded, int(pairs.source_count.min()), int(pairs.target_count.min()))
         batch = network_batch(pairs)
         inputs = input_features(batch.points, batch.mask, encoded, network.config.moment_radii)
         centres = batch.points[:, :encoded]
