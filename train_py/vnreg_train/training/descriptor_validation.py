@@ -72,7 +72,7 @@ def pose_figures(
     """What the poses are worth that single matches (rows, columns) propose by their frames.
 
     Per kind of frames: the share within 30 degrees where the match is right, whether any pose of
-    all matches is good (15 degrees, and the centroid of the source within 0.2), and of the first 64.
+    all matches is good (15 degrees, the centroid of the source within 0.2), and of the first 64.
     """
     figures = {}
     any_good = torch.zeros(len(rows), dtype=torch.bool)
