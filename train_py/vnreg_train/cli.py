@@ -88,14 +88,14 @@ def export(arguments: argparse.Namespace) -> None:
 def golden(arguments: argparse.Namespace) -> None:
     from vnreg_train.data.protocol import make_pair
     from vnreg_train.data.shapes import load_shapes
-    from vnreg_train.export.model import export_golden, load_checkpoint
+    from vnreg_train.export.checkpoint import golden_of_checkpoint
 
-    network, _ = load_checkpoint(Path(arguments.checkpoint))
     shapes = load_shapes(Path(arguments.data), "validation")
     pair = make_pair(shapes, arguments.shape, "independent", 180)
     # Few points, and not equally many: the file holds every activation.
     source, target = pair.source[:128].astype("float64"), pair.target[:120].astype("float64")
-    export_golden(network, Path(arguments.model), Path(arguments.out), source, target)
+    checkpoint, model, out = map(Path, (arguments.checkpoint, arguments.model, arguments.out))
+    golden_of_checkpoint(checkpoint, model, out, source, target)
 
 
 def parser() -> argparse.ArgumentParser:

@@ -16,8 +16,10 @@ from parity_twin import ROOT
 from scipy.spatial.transform import Rotation
 
 import vnreg
+from vnreg_train.export.descriptor_golden import export_descriptor_golden
 from vnreg_train.export.descriptor_model import export_descriptor_model, import_descriptor_model
 from vnreg_train.export.descriptor_reference import DescriptorReference
+from vnreg_train.model_file import read_checksum, read_model
 from vnreg_train.networks.descriptor import DescriptorNetwork
 from vnreg_train.networks.descriptor_config import DescriptorConfig
 
@@ -124,6 +126,20 @@ def test_as_many_points_are_encoded_as_the_file_says(
     for side, count in (("source", ENCODED), ("target", 150)):
         assert len(np.unique(stages[f"{side}.encoded"])) == count
         assert len(stages[f"{side}.significance"]) == count
+
+
+def test_a_golden_file_holds_what_the_engine_computes(
+    twin: Callable[[str], DescriptorTwin], tmp_path: Path
+) -> None:
+    model = twin("odd")
+    pair = make_test_pair(3, 90, 70, noisy=False)
+    export_descriptor_golden(model.path, tmp_path / "golden.vnr", pair.source, pair.target)
+    metadata, tensors = read_model(tmp_path / "golden.vnr")
+    assert metadata["model.crc"] == read_checksum(model.path)
+    stages = model.engine(pair.source, pair.target)
+    assert {f"stage.{name}" for name in stages} == {k for k in tensors if k.startswith("stage.")}
+    for name, value in stages.items():
+        assert normalised_error(value, tensors[f"stage.{name}"]) <= LIMIT, name
 
 
 def by_index(stages: Stages, side: str, stage: str) -> NDArray[np.generic]:

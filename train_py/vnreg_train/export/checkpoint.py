@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from vnreg_train.export.descriptor_model import export_descriptor_model, load_descriptor_checkpoint
-from vnreg_train.export.model import Metadata, export_model, load_checkpoint
+from vnreg_train.export.model import Metadata, export_golden, export_model, load_checkpoint
+
+
+def checkpoint_arch(checkpoint: Path) -> str:
+    """`paper` or `vnreg`."""
+    return str(torch.load(checkpoint, weights_only=True)["config"].get("arch", "paper"))
 
 
 def export_checkpoint(
@@ -18,10 +25,25 @@ def export_checkpoint(
     extra: Metadata | None = None,
 ) -> None:
     """Writes the averaged weights; `name` None: the configuration's. See `export_model`."""
-    arch = torch.load(checkpoint, weights_only=True)["config"].get("arch", "paper")
-    if arch == "vnreg":
+    if checkpoint_arch(checkpoint) == "vnreg":
         network, config = load_descriptor_checkpoint(checkpoint)
         export_descriptor_model(network, path, name or config["name"], points=points, extra=extra)
     else:
         paper, config = load_checkpoint(checkpoint)
         export_model(paper, path, name or config["name"], points=points, extra=extra)
+
+
+def golden_of_checkpoint(
+    checkpoint: Path,
+    model: Path,
+    path: Path,
+    source: NDArray[np.float64],
+    target: NDArray[np.float64],
+) -> None:
+    """Writes what torch makes of a pair of clouds (N, 3), (M, 3), for the model file `model`."""
+    if checkpoint_arch(checkpoint) == "vnreg":
+        from vnreg_train.export.descriptor_golden import export_descriptor_golden  # needs vnreg
+
+        export_descriptor_golden(model, path, source, target)
+    else:
+        export_golden(load_checkpoint(checkpoint)[0], model, path, source, target)
