@@ -162,8 +162,7 @@ void write_messages(const Tile& t, const CollectLayer& layer, kernels::Floats& m
     const float* gate = t.s.gate.data() + k * p;
     for (Index axis = 0; axis < 3; ++axis) {
       for (Index i = 0; i < k; ++i) message[axis * k + i] = place[axis] * gate[i];
-      std::copy_n(t.s.normalized.data() + (axis * t.width + p) * c, c,
-                  message + 4 * k + axis * c);
+      std::copy_n(t.s.normalized.data() + (axis * t.width + p) * c, c, message + 4 * k + axis * c);
     }
     std::copy_n(gate, k, message + 3 * k);
     std::copy_n(t.z() + p * h, h, message + 4 * k + 3 * c);
@@ -340,12 +339,10 @@ void pool(const DescriptorModel& model, DescriptorFeatures& f) noexcept {
 
 void pool_scalars(const DescriptorModel& model, DescriptorFeatures& f) noexcept {
   const Index h = padded(model.arch.scalars);
-  const Eigen::Map<const Eigen::ArrayXXf> sums(f.scalar_sums.data(), h,
-                                               encoded_tiles(f.out.count));
+  const Eigen::Map<const Eigen::ArrayXXf> sums(f.scalar_sums.data(), h, encoded_tiles(f.out.count));
   Eigen::Map<Eigen::ArrayXf>(f.scalar_mean.data(), h) =
       sums.rowwise().sum() / static_cast<float>(f.out.count);
-  kernels::multiply(model.context_mlp_pooled, f.scalar_mean.data(), h, 1, f.mlp_constant.data(),
-                    h);
+  kernels::multiply(model.context_mlp_pooled, f.scalar_mean.data(), h, 1, f.mlp_constant.data(), h);
   Eigen::Map<Eigen::ArrayXf>(f.mlp_constant.data(), h) +=
       Eigen::Map<const Eigen::ArrayXf>(model.context_mlp[0].bias.data(), h);
 }
@@ -386,8 +383,8 @@ class Recording {
   void vectors(const char* name, kernels::Floats DescriptorFeatures::*buffer,
                Index channels) const noexcept {
     for (Index side = 0; side < 2; ++side) {
-      recorder_.vectors(side_name(side), name, (w_.features[side].*buffer).data(),
-                        padded(channels), channels, w_.features[side].out.count, encoded_tile);
+      recorder_.vectors(side_name(side), name, (w_.features[side].*buffer).data(), padded(channels),
+                        channels, w_.features[side].out.count, encoded_tile);
     }
   }
   void scalars(const char* name, kernels::Floats DescriptorFeatures::*buffer,

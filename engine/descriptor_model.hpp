@@ -11,9 +11,9 @@
 namespace vnreg::detail {
 
 struct DescriptorArchitecture {
-  Index vectors = 0;  // C
-  Index scalars = 0;  // H
-  Index gates = 0;    // K
+  Index vectors = 0;   // C
+  Index scalars = 0;   // H
+  Index gates = 0;     // K
   Index products = 0;  // P
   Index local_descriptor = 0;
   Index context_descriptor = 0;
@@ -68,7 +68,8 @@ struct DescriptorModel {
   std::vector<kernels::LeanBlock> context_blocks;
   kernels::PackedMatrix context_products, context_products_pooled;
   kernels::Linear context_mlp[2];
-  kernels::PackedMatrix context_mlp_pooled;  // the part of context_mlp[0] that takes the mean scalars
+  kernels::PackedMatrix
+      context_mlp_pooled;  // the part of context_mlp[0] that takes the mean scalars
   PointHead context_head;
   kernels::Linear logits;
   kernels::PackedMatrix global;

@@ -17,16 +17,16 @@ constexpr Index encoded_tiles(Index points) noexcept {
 /// Activations of one cloud. Vector features lie tile after tile, scalars point after point.
 struct DescriptorFeatures {
   CloudDescriptors out;
-  std::vector<std::uint64_t> keys;  // of the selection
-  kernels::Floats local_inputs;     // 21 vectors; kept only when stages are recorded
-  kernels::Floats scalar_inputs;    // 18; kept only when stages are recorded
-  kernels::Floats context_inputs;   // 8 vectors
-  kernels::Floats v;                // C
-  kernels::Floats kept_v;           // C: v at the end of the local stage, when recorded
-  kernels::Floats normalized;       // C: n(v) at the end
-  kernels::Floats z;                // H: z1, then z2, then z3
-  kernels::Floats near;             // H: mean scalars of the second neighbourhood
-  kernels::Floats messages[2];      // of the two neighbourhood layers
+  std::vector<std::uint64_t> keys;    // of the selection
+  kernels::Floats local_inputs;       // 21 vectors; kept only when stages are recorded
+  kernels::Floats scalar_inputs;      // 18; kept only when stages are recorded
+  kernels::Floats context_inputs;     // 8 vectors
+  kernels::Floats v;                  // C
+  kernels::Floats kept_v;             // C: v at the end of the local stage, when recorded
+  kernels::Floats normalized;         // C: n(v) at the end
+  kernels::Floats z;                  // H: z1, then z2, then z3
+  kernels::Floats near;               // H: mean scalars of the second neighbourhood
+  kernels::Floats messages[2];        // of the two neighbourhood layers
   kernels::Floats sums, scalar_sums;  // per tile
   kernels::Floats mean, scalar_mean, constant, mlp_constant, partners;
   kernels::Floats share;  // logits, then weights, of the global feature

@@ -25,14 +25,14 @@ struct CloudDescriptors {
 
   // Vectors that turn with the cloud, of unit Frobenius norm per point: R of a match maximises
   // sum_f <R source_f, target_f>.
-  Index frames = 0;               // F
-  kernels::Floats local_frames;   // E x F x 3
+  Index frames = 0;                // F
+  kernels::Floats local_frames;    // E x F x 3
   kernels::Floats context_frames;  // E x F x 3
 
   kernels::Floats covariance;  // E x 6: xx, xy, xz, yy, yz, zz of the points near, of the smallest
                                // moment radius r, times 4 / r^2
   Index global_rows = 0;       // column stride of `global`
-  kernels::Floats global;      // G points as x | y | z; paired rows of two clouds give a coarse pose
+  kernels::Floats global;  // G points as x | y | z; paired rows of two clouds give a coarse pose
 
   CloudDescriptors() = default;
   CloudDescriptors(const DescriptorArchitecture& arch, Index max_encoded);

@@ -62,8 +62,8 @@ Index find_nearby(const Coordinates& points, Index count, Index self, float radi
                   CollectScratch& s) noexcept {
   using Array = Eigen::Map<const Eigen::ArrayXf>;
   const Array x(points.x, count), y(points.y, count), z(points.z, count);
-  const auto squared = (x - points.x[self]).square() + (y - points.y[self]).square() +
-                       (z - points.z[self]).square();
+  const auto squared =
+      (x - points.x[self]).square() + (y - points.y[self]).square() + (z - points.z[self]).square();
   float* weight = s.weight_of.data();
   Eigen::Map<Eigen::ArrayXf, Eigen::AlignedMax> weights(weight, count);
   weights = (1.0f - squared * (1.0f / (radius * radius))).max(0.0f).square();

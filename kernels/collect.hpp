@@ -14,8 +14,8 @@ struct CollectScratch {
   CollectScratch() = default;
   explicit CollectScratch(Index max_points);
 
-  Floats weight_of;                    // of every point
-  std::vector<std::uint32_t> nearby;   // points with a weight
+  Floats weight_of;                   // of every point
+  std::vector<std::uint32_t> nearby;  // points with a weight
 };
 
 /// out = sum_j w_j row_j over the `count` points, where row_j starts at rows + j * length; `length`

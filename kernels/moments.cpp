@@ -64,8 +64,8 @@ Moments finish(const Sums& s, float radius) noexcept {
   constexpr Index row[6] = {0, 0, 0, 1, 1, 2};
   constexpr Index column[6] = {0, 1, 2, 1, 2, 2};
   for (Index i = 0; i < 6; ++i) {
-    m.covariance[i] = 4.0f * (per_radius / radius * total(second[i]) -
-                              m.offset[row[i]] * m.offset[column[i]]);
+    m.covariance[i] =
+        4.0f * (per_radius / radius * total(second[i]) - m.offset[row[i]] * m.offset[column[i]]);
   }
   const float per_cube = per_radius / (radius * radius);
   m.skew[0] = per_cube * total(s.cubic_x);

@@ -1,6 +1,6 @@
-// What a point sees of its surroundings: moments of a cloud within a radius r of a centre (docs/design.md).
-// With weights w = (1 - d^2/r^2)^2 for d < r, else 0, and <> the weighted mean of the offsets from
-// the centre, they depend neither on the number of points nor on their order.
+// What a point sees of its surroundings: moments of a cloud within a radius r of a centre
+// (docs/design.md). With weights w = (1 - d^2/r^2)^2 for d < r, else 0, and <> the weighted mean of
+// the offsets from the centre, they depend neither on the number of points nor on their order.
 #pragma once
 
 #include "kernels/spatial_index.hpp"

@@ -47,8 +47,8 @@ void partner_products(const float* v, Index rows, const float* partners, Index p
                       bool shared, Index count, Index points, float* out,
                       Index out_stride) noexcept {
   const VectorsView vectors = tile_view(v, rows, points);
-  const VectorsView q = shared ? VectorsView{partners, 0, partner_rows}
-                               : tile_view(partners, partner_rows, points);
+  const VectorsView q =
+      shared ? VectorsView{partners, 0, partner_rows} : tile_view(partners, partner_rows, points);
   for (Index p = 0; p < points; ++p) {
     const float* vx = vectors.at(p, 0);
     const float* vy = vectors.at(p, 1);

@@ -1,5 +1,6 @@
-// The lean block of the network `vnreg` (docs/design.md): n = v by its r.m.s. length, h = VN-ReLU(n),
-// v + W h + Q mean h. Vector features of a tile as in vn_linear.hpp; padding rows stay zero.
+// The lean block of the network `vnreg` (docs/design.md): n = v by its r.m.s. length, h =
+// VN-ReLU(n), v + W h + Q mean h. Vector features of a tile as in vn_linear.hpp; padding rows stay
+// zero.
 #pragma once
 
 #include "kernels/vn_linear.hpp"
@@ -25,9 +26,9 @@ void lean_block(const LeanBlock& block, Index points, float* v, float* normalize
 /// v += m for every point, m of rows x 3.
 void add_to_points(const float* m, Index rows, Index points, float* v) noexcept;
 
-/// Inner products <v_c, q_p> with `count` partners q (a tile of `partner_rows` rows, or one rows x 3
-/// feature that all points share): out[p * rows + c] of each point, whose columns are `out_stride`
-/// apart.
+/// Inner products <v_c, q_p> with `count` partners q (a tile of `partner_rows` rows, or one rows x
+/// 3 feature that all points share): out[p * rows + c] of each point, whose columns are
+/// `out_stride` apart.
 void partner_products(const float* v, Index rows, const float* partners, Index partner_rows,
                       bool shared, Index count, Index points, float* out,
                       Index out_stride) noexcept;
