@@ -16,7 +16,7 @@ struct Moments {
 };
 
 /// `leaf_bounds` is room for index.leaves() numbers; `centre` one of the points of the index or any
-/// place with a point nearer than each radius; `radii` ascending.
+/// place with a point nearer than each radius.
 void radius_moments(const SpatialIndex& index, const float centre[3],
                     const float radii[moment_radii], float* leaf_bounds,
                     Moments out[moment_radii]) noexcept;
