@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <span>
 
 namespace vnreg::detail {
 namespace {
@@ -65,6 +66,15 @@ void read_paper_parameters(const ModelFile& file, Architecture& a) {
   a.keep_divisor = read_index(file, "fine.keep_divisor", 1, 64);
 }
 
+bool has_any(const ModelFile& file, std::span<const std::string> keys) {
+  return std::any_of(keys.begin(), keys.end(), [&](const auto& key) { return file.has(key); });
+}
+
+double read_finite(const ModelFile& file, std::string_view key) {
+  constexpr double limit = std::numeric_limits<double>::max();
+  return file.get_f64(key, -limit, limit);
+}
+
 }  // namespace
 
 Index Architecture::min_points() const noexcept {
@@ -91,16 +101,30 @@ Architecture read_architecture(const ModelFile& file) {
 }
 
 std::optional<Calibration> read_calibration(const ModelFile& file) {
-  constexpr std::array<std::string_view, 3> keys{"calibration.bias", "calibration.overlap",
-                                                 "calibration.residual"};
-  if (std::none_of(keys.begin(), keys.end(), [&](auto key) { return file.has(key); })) {
-    return std::nullopt;
-  }
-  const auto read = [&file](std::string_view key) {
-    constexpr double limit = std::numeric_limits<double>::max();
-    return file.get_f64(key, -limit, limit);
-  };
-  return Calibration{read(keys[0]), read(keys[1]), read(keys[2])};
+  const std::array<std::string, 3> keys{"calibration.bias", "calibration.overlap",
+                                        "calibration.residual"};
+  if (!has_any(file, keys)) return std::nullopt;
+  return Calibration{read_finite(file, keys[0]), read_finite(file, keys[1]),
+                     read_finite(file, keys[2])};
+}
+
+std::optional<VerifiedCalibration> read_verified_calibration(const ModelFile& file) {
+  constexpr std::size_t weights = Evidence::names.size();
+  const std::string prefix = "calibration.verified.";
+  std::array<std::string, weights + 1> keys;
+  std::transform(Evidence::names.begin(), Evidence::names.end(), keys.begin(),
+                 [&](std::string_view name) { return prefix + std::string(name); });
+  keys[weights] = prefix + "bias";
+  if (!has_any(file, keys)) return std::nullopt;
+  VerifiedCalibration calibration;
+  for (std::size_t i = 0; i < weights; ++i) calibration.weights[i] = read_finite(file, keys[i]);
+  calibration.bias = read_finite(file, keys[weights]);
+  return calibration;
+}
+
+double read_covariance_inflation(const ModelFile& file) {
+  constexpr std::string_view key = "calibration.verified.covariance";
+  return file.has(key) ? file.get_f64(key, 1e-3, 1e3) : 1.0;
 }
 
 }  // namespace vnreg::detail

@@ -1,11 +1,13 @@
 // Which network a model holds, and the hyper-parameters of architecture `paper` (docs/design.md).
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 
 #include "kernels/packets.hpp"
 #include "model_format/model_file.hpp"
+#include "vnreg/vnreg.hpp"
 
 namespace vnreg::detail {
 
@@ -42,10 +44,22 @@ struct Calibration {
   double residual = 0;
 };
 
+/// confidence = sigmoid(bias + sum of weight * value over the evidence, in the order of its names).
+struct VerifiedCalibration {
+  double bias = 0;
+  std::array<double, Evidence::names.size()> weights{};
+};
+
 /// Throws Error (wrong_architecture) for an absent key, another type or a value out of range.
 Architecture read_architecture(const model_format::ModelFile& file);
 
 /// All three keys, or none.
 std::optional<Calibration> read_calibration(const model_format::ModelFile& file);
+
+/// The bias and a weight for every name of the evidence, or none of them.
+std::optional<VerifiedCalibration> read_verified_calibration(const model_format::ModelFile& file);
+
+/// What the covariance is to be multiplied by; 1 where the file does not say.
+double read_covariance_inflation(const model_format::ModelFile& file);
 
 }  // namespace vnreg::detail

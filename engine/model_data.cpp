@@ -98,6 +98,8 @@ std::shared_ptr<const ModelData> read_model_data(const ModelFile& file) {
   auto model = std::make_shared<ModelData>();
   model->arch = read_architecture(file);
   model->calibration = read_calibration(file);
+  model->verified_calibration = read_verified_calibration(file);
+  model->covariance_inflation = read_covariance_inflation(file);
   TensorSet tensors(file);
   if (model->arch.family == Family::vnreg) {
     model->descriptor_model = read_descriptor_model(file, tensors);

@@ -18,7 +18,9 @@ namespace vnreg::detail {
 
 struct ModelData {
   Architecture arch;
-  std::optional<Calibration> calibration;
+  std::optional<Calibration> calibration;  // of modes coarse and paper
+  std::optional<VerifiedCalibration> verified_calibration;
+  double covariance_inflation = 1;
 
   // Architecture `vnreg`; nothing below belongs to it.
   std::optional<DescriptorModel> descriptor_model;

@@ -5,6 +5,8 @@
 
 #include "engine/cloud.hpp"
 #include "engine/coarse.hpp"
+#include "engine/confidence.hpp"
+#include "engine/covariance.hpp"
 #include "engine/cpu.hpp"
 #include "engine/descriptor_encoder.hpp"
 #include "engine/encoder.hpp"
@@ -92,19 +94,21 @@ bool finite(const Pose& pose) noexcept {
   return Eigen::Map<const Eigen::Matrix<double, 16, 1>>(pose.data()).allFinite();
 }
 
-/// Replaces `transform` by the best of all poses; false if the clouds determine none.
-bool verify(std::span<const RigidTransform> proposals, const Options& options, double scale,
-            Workspace& w, RigidTransform& transform, Result& result, bool& unclear) noexcept {
-  const VerifiedPoses poses = register_verified(proposals, options.seed, w, result.ms);
-  if (poses.count == 0) return false;
-  transform = poses.pose[0].transform;
-  unclear = ambiguous(poses);
+/// What mode verified says about its answer, the first of the poses, and the other ones.
+Status judge(const VerifiedPoses& poses, const ModelData& model, double scale, const Workspace& w,
+             Result& result) noexcept {
   result.score = poses.pose[0].score;
   for (Index i = 1; i < poses.count; ++i) {
     const ScoredPose& other = poses.pose[i];
     result.alternatives.push_back({user_pose(other.transform, scale, w.cloud), other.score});
   }
-  return true;
+  const Uncertainty uncertainty = measure_uncertainty(poses.pose[0].transform, w.verified);
+  result.covariance = user_covariance(uncertainty, model.covariance_inflation, scale, w.cloud[1]);
+  result.evidence = collect_evidence(poses, uncertainty, w.verified);
+  result.confidence = confidence(model.verified_calibration, result.evidence);
+  // Before low confidence, because it says more: which other poses it may be.
+  if (ambiguous(poses)) return Status::ambiguous;
+  return result.confidence < 0.5 ? Status::low_confidence : Status::ok;
 }
 
 /// Everything but the total time. Leaves `result` without a pose unless it has a finite one.
@@ -134,13 +138,13 @@ Status run(const ModelData& model, const Options& options, const PointsView clou
     transform = register_fine(model, coarse.transform, w);
     result.ms.fine = watch.lap();
   }
-  bool unclear = false;
+  VerifiedPoses poses;
   if (options.mode == Mode::verified) {
     const RigidTransform proposals[most_proposals] = {coarse_transform, transform};
     const std::size_t count = !coarse.determined ? 0 : w.local ? 2 : 1;
-    if (!verify({proposals, count}, options, scale, w, transform, result, unclear)) {
-      return Status::degenerate;
-    }
+    poses = register_verified({proposals, count}, options.seed, w, result.ms);
+    if (poses.count == 0) return Status::degenerate;
+    transform = poses.pose[0].transform;
     watch.lap();  // register_verified has taken its own times
   }
   const Pose pose = user_pose(transform, scale, w.cloud);
@@ -153,11 +157,15 @@ Status run(const ModelData& model, const Options& options, const PointsView clou
   result.overlap = residual.overlap;
   result.rmse = residual.rmse * scale;
   result.inlier_distance = residual.inlier_distance * scale;
-  // The calibration was fitted on the paper's pipeline; it says nothing about verified poses.
-  if (options.mode != Mode::verified) result.confidence = confidence(model, residual);
+  Status status = Status::ok;
+  if (options.mode == Mode::verified) {
+    status = judge(poses, model, scale, w, result);
+  } else {
+    result.confidence = confidence(model.calibration, residual);
+    if (result.confidence < 0.5) status = Status::low_confidence;
+  }
   result.ms.measure = watch.lap();
-  if (result.confidence < 0.5) return Status::low_confidence;
-  return unclear ? Status::ambiguous : Status::ok;
+  return status;
 }
 
 void check_range(const char* field, int value, int min, int max, bool zero_allowed) {

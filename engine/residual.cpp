@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "engine/rigid.hpp"
 
@@ -71,14 +70,6 @@ Residual measure_residual(const kernels::RigidTransform& pose, Workspace& w) noe
   result.overlap = static_cast<double>(inliers) / static_cast<double>(points);
   result.rmse = inliers > 0 ? std::sqrt(squares / static_cast<double>(inliers)) : 0.0;
   return result;
-}
-
-double confidence(const ModelData& model, const Residual& residual) noexcept {
-  if (!model.calibration) return std::numeric_limits<double>::quiet_NaN();
-  const double relative =
-      residual.inlier_distance > 0 ? residual.rmse / residual.inlier_distance : 0.0;
-  const Calibration& c = *model.calibration;
-  return 1.0 / (1.0 + std::exp(-(c.bias + c.overlap * residual.overlap + c.residual * relative)));
 }
 
 }  // namespace vnreg::detail

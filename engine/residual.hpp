@@ -15,7 +15,4 @@ struct Residual {              // lengths in network coordinates
 /// Moves each cloud onto the other and measures the distance of every point to its nearest.
 Residual measure_residual(const kernels::RigidTransform& pose, Workspace& workspace) noexcept;
 
-/// Calibrated probability that the pose is right; NaN without a calibration.
-double confidence(const ModelData& model, const Residual& residual) noexcept;
-
 }  // namespace vnreg::detail

@@ -5,6 +5,7 @@
 #include <nanobind/stl/string_view.h>
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -100,6 +101,21 @@ nb::object pose_array(const Pose& pose) {
   return float_array(pose, shape);
 }
 
+nb::object covariance_array(const Covariance& covariance) {
+  static constexpr std::array<std::size_t, 2> shape{6, 6};
+  return float_array(covariance, shape);
+}
+
+nb::dict evidence_dict(const Evidence& evidence) {
+  const auto values = evidence.values();
+  nb::dict dict;
+  if (std::isnan(evidence.score)) return dict;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    dict[nb::str(Evidence::names[i].data(), Evidence::names[i].size())] = values[i];
+  }
+  return dict;
+}
+
 nb::list alternative_list(const Result& result) {
   nb::list list;
   for (const Alternative& alternative : result.alternatives) list.append(nb::cast(alternative));
@@ -171,8 +187,9 @@ void bind_result(nb::module_& module) {
   nb::class_<Result>(module, "Result", "What an alignment found. target = R source + t.")
       .def_prop_ro(
           "status", [](const Result& r) { return to_string(r.status); },
-          "'ok', 'low_confidence', 'ambiguous' (a pose was found, but an alternative fits nearly\n"
-          "as well), or without a pose: 'too_few_points', 'not_finite', 'degenerate'.")
+          "'ok', 'low_confidence' (more likely wrong than right), 'ambiguous' (an alternative\n"
+          "fits nearly as well; goes before 'low_confidence'), or without a pose:\n"
+          "'too_few_points', 'not_finite', 'degenerate'.")
       .def_ro("has_pose", &Result::has_pose, "Whether there is a pose; if not, the poses are NaN.")
       .def_prop_ro(
           "T_target_source",
@@ -182,8 +199,15 @@ void bind_result(nb::module_& module) {
           "T_target_source_coarse",
           [](const Result& r) { return pose_array(pose_or_nan(r, r.T_target_source_coarse)); },
           "(4, 4) float64: the coarse register's answer alone (paper, section III-C).")
+      .def_prop_ro(
+          "covariance", [](const Result& r) { return covariance_array(r.covariance); },
+          "(6, 6) float64, mode 'verified': of the error of T_target_source, provided that it is\n"
+          "right; else NaN. The error is (w, v), rotation vector in radians and translation in\n"
+          "input units, in the target's frame: T_true = [exp([w]x), v; 0, 1] T_target_source.")
       .def_ro("confidence", &Result::confidence,
-              "Calibrated probability that the pose is right; NaN where the model has none.")
+              "Calibrated probability that the pose is right (within 5 degrees and 0.2 of the\n"
+              "longest side; in mode 'verified' up to the object's symmetry); NaN where the model\n"
+              "has no calibration of the mode.")
       .def_ro("overlap", &Result::overlap,
               "Share of the points of both clouds with a neighbour within `inlier_distance`.")
       .def_ro("rmse", &Result::rmse, "Root mean square distance of those inliers, input units.")
@@ -193,6 +217,13 @@ void bind_result(nb::module_& module) {
           "Mode 'verified': 0 to 1, how far each cloud's surface lies on the other's; else NaN.")
       .def_prop_ro("alternatives", &alternative_list,
                    "Mode 'verified': the other poses that fit nearly as well, the best first.")
+      .def_prop_ro(
+          "evidence", [](const Result& r) { return evidence_dict(r.evidence); },
+          "{name: float}, mode 'verified': what the confidence is computed from; else empty.\n"
+          "score, margin (over the next pose), shares of points: covered (have a match),\n"
+          "contradicted (have none where they should), beyond (the other cloud ends before them);\n"
+          "residual and noise (r.m.s. distances from planes, in point spacings), certainty (log10\n"
+          "of the information on the rotation).")
       .def_ro("points_source", &Result::points_source, "Points used, after subsampling.")
       .def_ro("points_target", &Result::points_target, "Points used, after subsampling.")
       .def_prop_ro(
@@ -205,9 +236,8 @@ void bind_registrar(nb::module_& module) {
   nb::class_<SharedRegistrar>(
       module, "Registrar",
       "Aligns pairs of clouds with one model; keeps its working memory between calls.\n\n"
-      "mode: 'paper' (coarse, then fine register), 'coarse' (it alone), or 'verified' (these "
-      "poses\n"
-      "and many others, judged by how well they fit, and refined).\n"
+      "mode: 'verified' (many poses, judged by how well they explain both clouds, and refined),\n"
+      "'paper' (coarse, then fine register), or 'coarse' (it alone).\n"
       "threads: 0 means what OpenMP says.\n"
       "max_points: larger clouds are subsampled to so many, 64 to 16384; 0 means model.points.\n"
       "seed: of the subsampling. record_stages: keep every activation for stages().\n"
@@ -219,7 +249,7 @@ void bind_registrar(nb::module_& module) {
             const Options options{mode_from(mode), threads, max_points, seed, record_stages};
             new (self) SharedRegistrar(chosen_model(model), options);
           },
-          "model"_a = nb::none(), nb::kw_only(), "mode"_a = "paper", "threads"_a = 1,
+          "model"_a = nb::none(), nb::kw_only(), "mode"_a = "verified", "threads"_a = 1,
           "max_points"_a = 0, "seed"_a = 0, "record_stages"_a = false)
       .def("align", &align_arrays, "source"_a.none(), "target"_a.none(),
            "The pose that maps `source` onto `target`, arrays (N, 3) and (M, 3).\n\n"
@@ -240,8 +270,8 @@ void bind_align(nb::module_& module) {
         SharedRegistrar registrar(chosen_model(model), options);
         return align_arrays(registrar, source, target);
       },
-      "source"_a.none(), "target"_a.none(), nb::kw_only(), "model"_a = nb::none(), "mode"_a = "paper",
-      "threads"_a = 1, "max_points"_a = 0, "seed"_a = 0,
+      "source"_a.none(), "target"_a.none(), nb::kw_only(), "model"_a = nb::none(),
+      "mode"_a = "verified", "threads"_a = 1, "max_points"_a = 0, "seed"_a = 0,
       "The pose that maps `source` (N, 3) onto `target` (M, 3), from any starting pose.\n\n"
       "model: None means the built-in one. The options are those of Registrar, which is faster\n"
       "for many pairs. Returns a Result. Raises ValueError, TypeError, Error as Registrar does.");

@@ -47,6 +47,8 @@ class Result:
     @property
     def T_target_source_coarse(self) -> NDArray[np.float64]: ...
     @property
+    def covariance(self) -> NDArray[np.float64]: ...
+    @property
     def confidence(self) -> float: ...
     @property
     def overlap(self) -> float: ...
@@ -59,6 +61,8 @@ class Result:
     @property
     def alternatives(self) -> list[Alternative]: ...
     @property
+    def evidence(self) -> dict[str, float]: ...
+    @property
     def points_source(self) -> int: ...
     @property
     def points_target(self) -> int: ...
@@ -70,7 +74,7 @@ class Registrar:
         self,
         model: Model | None = None,
         *,
-        mode: _Mode = "paper",
+        mode: _Mode = "verified",
         threads: int = 1,
         max_points: int = 0,
         seed: int = 0,
@@ -84,7 +88,7 @@ def align(
     target: ArrayLike,
     *,
     model: Model | None = None,
-    mode: _Mode = "paper",
+    mode: _Mode = "verified",
     threads: int = 1,
     max_points: int = 0,
     seed: int = 0,

@@ -67,24 +67,25 @@ inline constexpr Pose identity_pose{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0,
 enum class Mode {
   coarse,  // the global register alone (paper, section III-C)
   paper,   // coarse, then the fine register (paper, sections III-C and III-D)
-  verified,  // these poses and many others, proposed by pairs of points with normals, judged by how
-             // well they explain both clouds, and refined (not part of the paper)
+  verified,  // these poses and many others, judged by how well they explain both clouds, and refined
+             // (the default; not part of the paper)
 };
 
 enum class Status {
   ok,              // a pose was found
-  low_confidence,  // a pose was found, but it is more likely wrong than right
+  low_confidence,  // a pose was found, but it is more likely wrong than right (confidence < 1/2)
   too_few_points,  // a cloud has fewer points than the network needs: no pose
   not_finite,      // a coordinate is NaN, infinite or beyond 1e300: no pose
   degenerate,      // a cloud's points coincide or lie on a line, or no rotation is determined: no pose
-  ambiguous,       // mode verified: a pose was found, but another fits nearly as well (a symmetry)
+  ambiguous,       // mode verified: a pose was found, but another fits nearly as well (a symmetry);
+                   // it goes before low_confidence: it says more
 };
 
 VNREG_API std::string_view to_string(Mode mode) noexcept;
 VNREG_API std::string_view to_string(Status status) noexcept;
 
 struct Options {
-  Mode mode = Mode::paper;
+  Mode mode = Mode::verified;
   /// OpenMP threads of one align call; 0 means what OpenMP says. With 1, no parallel region opens.
   int threads = 0;
   /// Clouds with more points are subsampled to this many (64 to 16,384); 0 means what the model
@@ -132,14 +133,48 @@ class Alternatives {
   std::size_t size_ = 0;
 };
 
+/// Row-major 6x6 covariance of a pose's error (w, v): rotation vector w in radians, then translation
+/// v in the units of the input. The error is a perturbation from the left, in the target's frame and
+/// about its origin: R_true = exp([w]x) R and t_true = exp([w]x) t + v for the pose (R, t), so
+/// T_true = [exp([w]x), v; 0, 1] * T_target_source.
+using Covariance = std::array<double, 36>;
+inline constexpr Covariance unknown_covariance = [] {
+  Covariance c{};
+  c.fill(std::numeric_limits<double>::quiet_NaN());
+  return c;
+}();
+
+/// What the confidence of mode verified is computed from; lengths are relative to the distance of
+/// neighbouring points (the sparser cloud's).
+struct Evidence {
+  double score = std::numeric_limits<double>::quiet_NaN();  // of the pose
+  double margin = score;        // 1 - second best score / score; 1 where there is no other pose
+  double covered = score;       // share of the points of both clouds that have a match in the other
+  double contradicted = score;  // share without, where the other cloud should show something
+  double beyond = score;        // share without, outside of what the other cloud shows
+  double residual = score;      // r.m.s. distance of matched points from the planes of their matches
+  double noise = score;         // r.m.s. distance of points from the planes of their own cloud
+  double certainty = score;     // log10 of the least eigenvalue of the information that a matched
+                                // point gives on the rotation: how well the shape holds it
+
+  static constexpr std::array<std::string_view, 8> names{
+      "score", "margin", "covered", "contradicted", "beyond", "residual", "noise", "certainty"};
+  /// In the order of the names.
+  std::array<double, names.size()> values() const noexcept {
+    return {score, margin, covered, contradicted, beyond, residual, noise, certainty};
+  }
+};
+
 struct Result {
   Status status = Status::degenerate;
   bool has_pose = false;                      // false: the poses below are the identity
   Pose T_target_source = identity_pose;       // target = T * source, in the units of the input
   Pose T_target_source_coarse = identity_pose;  // the coarse register's answer alone; the identity
                                                 // where it has none (mode verified only)
-  /// Calibrated probability that the pose is right; NaN where the model carries no
-  /// calibration, and in mode verified, which the calibration was not fitted on.
+  /// Mode verified: of T_target_source, provided that it is right. Else NaN.
+  Covariance covariance = unknown_covariance;
+  /// Probability that the pose is right: within 5 degrees and 0.2 of the longest side, in mode
+  /// verified up to the object's symmetry. NaN where the model carries no calibration of the mode.
   double confidence = std::numeric_limits<double>::quiet_NaN();
   /// Share of points (both clouds) whose nearest point in the other cloud is within `inlier_distance`.
   double overlap = 0;
@@ -149,6 +184,7 @@ struct Result {
   /// and differ from it and from each other by 15 degrees or 0.1 r.m.s. radii. Else NaN and none.
   double score = std::numeric_limits<double>::quiet_NaN();
   Alternatives alternatives;
+  Evidence evidence;  // mode verified; else NaN
   std::size_t points_source = 0;  // points used, after subsampling
   std::size_t points_target = 0;
   StageTimes ms;
