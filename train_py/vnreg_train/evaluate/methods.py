@@ -60,14 +60,13 @@ class EngineMethod:
         start = time.process_time()
         result = self._registrar.align(pair.source, pair.target)
         ms = 1000 * (time.process_time() - start)
-        covariance = np.asarray(getattr(result, "covariance", np.nan))
         return Estimate(
             T_target_source=result.T_target_source if result.has_pose else None,
             ms=ms,
             status=result.status,
             confidence=result.confidence,
             evidence=_evidence(result, self.mode),
-            covariance=covariance if np.isfinite(covariance).all() else None,
+            covariance=result.covariance if np.isfinite(result.covariance).all() else None,
             alternatives=tuple(a.T_target_source for a in result.alternatives),
         )
 
@@ -75,7 +74,7 @@ class EngineMethod:
 def _evidence(result: vnreg.Result, mode: str) -> dict[str, float]:
     """What the confidence of the mode is computed from, by the names of its model-file keys."""
     if mode == "verified":
-        return {name: float(value) for name, value in getattr(result, "evidence", {}).items()}
+        return result.evidence
     near = result.inlier_distance
     return {"overlap": result.overlap, "residual": result.rmse / near if near > 0 else 0.0}
 
