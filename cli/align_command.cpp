@@ -86,6 +86,16 @@ void write_moved(const std::string& path, const Points& source, const Pose& pose
   }
 }
 
+std::array<double, 3> middle_of(const Points& points) {
+  std::array<double, 3> middle{};
+  for (const auto& point : points) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      middle[axis] += point[axis] / static_cast<double>(points.size());
+    }
+  }
+  return middle;
+}
+
 std::string check_ply_name(const std::string& path) {
   std::string end = path.substr(path.size() - std::min<std::size_t>(path.size(), 4));
   return CLI::detail::to_lower(end) == ".ply" ? ""
@@ -119,13 +129,12 @@ CLI::App* add_align_command(CLI::App& app, AlignArguments& arguments) {
       ->add_option_function<std::string>(
           "--mode",
           [&arguments](const std::string& name) {
-            arguments.mode = name == "coarse"  ? Mode::coarse
-                             : name == "paper" ? Mode::paper
-                                               : Mode::verified;
+            arguments.options.mode = name == "coarse"  ? Mode::coarse
+                                     : name == "paper" ? Mode::paper
+                                                       : Mode::verified;
           },
-          "coarse: the global register alone; paper: the fine register after it (default, "
-          "unless the model has none); verified: the pose that explains both clouds best, out of "
-          "many")
+          "verified (default): the pose that explains both clouds best, out of many; paper: the "
+          "coarse and the fine register; coarse: it alone")
       ->type_name("MODE")
       ->check(CLI::IsMember({"coarse", "paper", "verified"}));
   command->add_option("--threads", arguments.options.threads, "Threads; 0: as many as OpenMP says")
@@ -151,14 +160,14 @@ Outcome run_align(const AlignArguments& arguments) {
   const Points source = cloud_file::read_cloud(arguments.source);
   const Points target = cloud_file::read_cloud(arguments.target);
   const Model model = arguments.model.empty() ? Model::builtin() : load_model(arguments.model);
-  auto [registrar, mode] = make_registrar(model, arguments.options, arguments.mode);
+  Registrar registrar = make_registrar(model, arguments.options);
   const Result& result = registrar.align(source, target);
   if (!result.has_pose) {
     refuse_clouds(result, {arguments.source, source}, {arguments.target, target},
                   model.min_points());
   }
   if (!arguments.output.empty()) write_moved(arguments.output, source, result.T_target_source);
-  const AlignReport report{result, model.name(), mode};
+  const AlignReport report{result, model.name(), arguments.options.mode, middle_of(source)};
   return {result.status == Status::ok ? ExitCode::ok : ExitCode::not_sure,
           arguments.json ? to_json(report) : to_text(report)};
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <optional>
 #include <string>
 
 #include "command.hpp"
@@ -16,8 +15,7 @@ struct AlignArguments {
   std::string output;  // empty: the moved source is not written
   std::string model;   // empty: the built-in model
   bool json = false;
-  std::optional<Mode> mode;  // none: the best that the model can
-  Options options;           // but for the mode
+  Options options;
 };
 
 /// Declares the command; the parse fills `arguments`.

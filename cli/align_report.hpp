@@ -1,6 +1,7 @@
 // What `vnreg align` prints: for people, or as JSON.
 #pragma once
 
+#include <array>
 #include <string>
 #include <string_view>
 
@@ -12,9 +13,11 @@ struct AlignReport {
   const Result& result;
   std::string_view model;  // its name
   Mode mode;
+  std::array<double, 3> source_middle;  // mean of the source's points
 };
 
-/// Several lines: pose, rotation, translation, status, confidence, overlap, residual, times.
+/// Several lines: pose, rotation, translation, uncertainty, status, confidence, alternatives,
+/// overlap, residual, times.
 std::string to_text(const AlignReport& report);
 
 /// One JSON object and a line end; docs/cli.md lists the keys. What is not known is null.

@@ -45,16 +45,12 @@ Model load_model(const std::string& path) {
   }
 }
 
-ModeRegistrar make_registrar(const Model& model, Options options, std::optional<Mode> mode) {
-  options.mode = mode.value_or(Mode::paper);
+Registrar make_registrar(const Model& model, const Options& options) {
   try {
-    return {Registrar(model, options), options.mode};
+    return Registrar(model, options);
   } catch (const Error& error) {
-    const bool lacks_fine_register =
-        error.code() == ErrorCode::invalid_option && error.field() == "mode";
-    if (mode || !lacks_fine_register) throw command_error(error, "");
+    throw command_error(error, "");
   }
-  return make_registrar(model, options, Mode::coarse);
 }
 
 std::string number_text(double value, int digits) {

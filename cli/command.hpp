@@ -1,7 +1,6 @@
 // What the commands of the program share: exit codes, the result of a command, and its failure.
 #pragma once
 
-#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -17,7 +16,7 @@ enum class ExitCode {
                  // selftest that differs
   usage = 2,     // the command line
   input = 3,     // a cloud or a model file
-  not_sure = 4,  // a pose was found, with low confidence
+  not_sure = 4,  // a pose was found, but with low confidence, or others fit as well
 };
 
 /// What a command has to say on stdout, and the exit code.
@@ -43,15 +42,8 @@ CommandError command_error(const Error& error, const std::string& path);
 /// Reads the model at `path`; throws CommandError that names the file.
 Model load_model(const std::string& path);
 
-/// A registrar, and the mode that it runs in.
-struct ModeRegistrar {
-  Registrar registrar;
-  Mode mode;
-};
-
-/// A registrar in the mode that is asked for; without one, in mode paper where the model has a fine
-/// register and in mode coarse where it has none. Throws CommandError.
-ModeRegistrar make_registrar(const Model& model, Options options, std::optional<Mode> mode);
+/// Throws CommandError for options that the model has no use for.
+Registrar make_registrar(const Model& model, const Options& options);
 
 /// `value` with `digits` significant digits, the same in every locale.
 std::string number_text(double value, int digits);

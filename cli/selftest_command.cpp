@@ -198,7 +198,7 @@ Outcome replay(const std::string& model_path, const std::string& golden_path) {
     // Every point counts: a golden run is never subsampled.
     options.max_points = static_cast<int>(
         std::clamp<std::size_t>(std::max(source.size(), target.size()), 64, 16384));
-    Registrar registrar = make_registrar(model, options, std::nullopt).registrar;
+    Registrar registrar = make_registrar(model, options);
     registrar.align(source, target);
     return report(golden, registrar.stages(), model_path + ", " + golden_path);
   } catch (const Error& error) {

@@ -13,8 +13,9 @@ double sigmoid(double x) noexcept { return 1 / (1 + std::exp(-x)); }
 
 /// How far the best pose stands out: 1 alone, 0 beside one that is as good.
 double margin_of(const VerifiedPoses& poses) noexcept {
-  if (poses.count < 2 || !(poses.pose[0].score > 0)) return 1;
-  return std::clamp(1 - poses.pose[1].score / poses.pose[0].score, 0.0, 1.0);
+  if (poses.count < 2) return 1;
+  const double best = poses.pose[0].score;
+  return best > 0 ? std::clamp(1 - poses.pose[1].score / best, 0.0, 1.0) : 0;
 }
 
 /// Of both clouds, in spacings.

@@ -69,7 +69,8 @@ TEST_CASE("the fewest points follow from the hyper-parameters") {
   REQUIRE(fewest({.neighbours = 64}) == 64);
   REQUIRE(fewest({.keep_divisor = 20}) == 60);
   Random random(32);
-  Registrar registrar(random_model({.neighbours = 64, .keep_divisor = 20}).build());
+  Registrar registrar(random_model({.neighbours = 64, .keep_divisor = 20}).build(),
+                      {.mode = Mode::coarse});
   REQUIRE(registrar.align(shape(63, random), shape(64, random)).status == Status::too_few_points);
   REQUIRE(registrar.align(shape(64, random), shape(64, random)).status == Status::ok);
 }

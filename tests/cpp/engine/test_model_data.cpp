@@ -164,7 +164,7 @@ TEST_CASE("from a file, from memory: the same model; no file, no model") {
   Random random(61);
   const Points source = shape(100, random);
   const Points target = shape(100, random);
-  Registrar from_file(Model::load(path.string()));
+  Registrar from_file(Model::load(path.string()), {.mode = Mode::paper});
   Registrar from_memory(draft.build(), {.mode = Mode::paper});
   REQUIRE(from_file.align(source, target).T_target_source ==
           from_memory.align(source, target).T_target_source);

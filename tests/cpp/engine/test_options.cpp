@@ -29,13 +29,26 @@ TEST_CASE("options out of range are refused by name") {
       Registrar(random_model({.global = 4, .local = 4}).build(), {.max_points = 16384}));
 }
 
-TEST_CASE("a model without a fine register runs the coarse mode only") {
+TEST_CASE("a model without a fine register runs the other modes") {
   const Model model = random_model({.fine_iterations = 0}).build();
-  refused(model, {}, "mode");
+  refused(model, {.mode = Mode::paper}, "mode");
   Random random(71);
   const Points cloud = shape(100, random);
-  Registrar coarse(model, {.mode = Mode::coarse});
-  REQUIRE(coarse.align(cloud, cloud).status == Status::ok);
+  for (const Mode mode : {Mode::coarse, Mode::verified}) {
+    REQUIRE(Registrar(model, {.mode = mode}).align(cloud, cloud).has_pose);
+  }
+}
+
+TEST_CASE("verified is the default mode") {
+  Random random(76);
+  const Points source = shape(200, random);
+  const Points target = moved(shape(200, random), random_motion(random, 1));
+  const Model model = random_model().build();
+  Registrar plain(model);
+  Registrar verified(model, {.mode = Mode::verified});
+  REQUIRE(plain.align(source, target).T_target_source ==
+          verified.align(source, target).T_target_source);
+  REQUIRE(plain.align(source, target).score > 0);
 }
 
 TEST_CASE("the coarse mode is the first half of the paper mode") {
@@ -82,11 +95,13 @@ TEST_CASE("times add up") {
 TEST_CASE("the words of the API") {
   REQUIRE(to_string(Mode::coarse) == "coarse");
   REQUIRE(to_string(Mode::paper) == "paper");
+  REQUIRE(to_string(Mode::verified) == "verified");
   REQUIRE(to_string(Status::ok) == "ok");
   REQUIRE(to_string(Status::low_confidence) == "low_confidence");
   REQUIRE(to_string(Status::too_few_points) == "too_few_points");
   REQUIRE(to_string(Status::not_finite) == "not_finite");
   REQUIRE(to_string(Status::degenerate) == "degenerate");
+  REQUIRE(to_string(Status::ambiguous) == "ambiguous");
   REQUIRE(to_string(static_cast<Status>(99)) == "unknown");
   REQUIRE(to_string(static_cast<Mode>(99)) == "unknown");
   REQUIRE(version() == VNREG_EXPECTED_VERSION);

@@ -111,8 +111,14 @@ def test_json_has_the_documented_keys_and_types(
     assert 0 <= answer["rmse"] <= answer["inlier_distance"]
     if mode == "verified":
         assert 0 < answer["score"] <= 1
+        covariance = np.array(answer["covariance"])
+        assert covariance.shape == (6, 6)
+        assert np.array_equal(covariance, covariance.T)
+        assert np.linalg.eigvalsh(covariance).min() > 0
+        assert answer["evidence"]["score"] == answer["score"]
+        assert all(math.isfinite(value) for value in answer["evidence"].values())
     else:
-        assert answer["score"] is None
+        assert answer["score"] is answer["covariance"] is answer["evidence"] is None
         assert answer["alternatives"] == []
     assert (answer["points_source"], answer["points_target"]) == (256, 256)
     times = answer["ms"]
@@ -141,10 +147,46 @@ def test_a_symmetric_body_is_ambiguous(
     for expected in (random_pose(9), random_pose(9) @ half_turn):
         errors = [rotation_error_deg(np.array(p["T_target_source"]), expected) for p in poses]
         assert min(errors) < 2
+    text = vnreg("align", tmp_path / "a.npy", tmp_path / "b.npy", *arguments[1:]).stdout
+    assert "status       ambiguous" in text
+    angles = re.findall(
+        r"^alternative  score .*, ([.\d]+) degrees and .* from this pose$", text, re.MULTILINE
+    )
+    assert len(angles) == len(answer["alternatives"])
+    assert any(abs(float(angle) - 180) < 2 for angle in angles)
     for alternative in answer["alternatives"]:
         assert list(alternative) == ["T_target_source", "score"]
         check_pose(alternative["T_target_source"])
         assert 0 < alternative["score"] <= answer["score"]
+
+
+def test_verified_is_the_default_mode(vnreg: Program, model: Path, pair: tuple[Path, Path]) -> None:
+    plain = vnreg("align", *pair, "--json", "--model", model).json()
+    assert plain["mode"] == "verified"
+    asked = vnreg("align", *pair, "--json", "--model", model, "--mode", "verified").json()
+    assert without_times(plain) == without_times(asked)
+
+
+def test_text_tells_how_sure_the_verified_pose_is(
+    vnreg: Program, model: Path, pair: tuple[Path, Path], shape: Points
+) -> None:
+    answer = vnreg("align", *pair, "--json", "--model", model).json()
+    text = vnreg("align", *pair, "--model", model).stdout
+    number = r"([-+.\de]+)"
+    line = rf"uncertainty  {number} degrees, {number} at the middle of the source"
+    match = re.search(line, text)
+    assert match
+    degrees, length = (float(printed) for printed in match.groups())
+    covariance = np.array(answer["covariance"])
+    assert math.isclose(
+        degrees, math.degrees(math.sqrt(np.trace(covariance[:3, :3]))), rel_tol=0.06
+    )
+    # Of many errors drawn from the covariance: how far they move the middle of the source.
+    middle = moved(np.array(answer["T_target_source"]), shape.mean(0)[None])[0]
+    draws = np.random.default_rng(0).multivariate_normal(np.zeros(6), covariance, size=20_000)
+    moves = draws[:, 3:] + np.cross(draws[:, :3], middle)
+    assert math.isclose(length, math.sqrt((moves**2).sum(1).mean()), rel_tol=0.1)
+    assert re.search(rf"^score        {number}$", text, re.MULTILINE)
 
 
 def test_text_says_what_json_says(vnreg: Program, model: Path, pair: tuple[Path, Path]) -> None:
