@@ -132,7 +132,7 @@ CLI::App* add_info_command(CLI::App& app, InfoArguments& arguments) {
   CLI::App* command = app.add_subcommand("info", "Print what a model file (.vnr) holds.");
   command->add_option("MODEL", arguments.model, "Model file")->type_name("FILE")->required();
   command->add_flag("--json", arguments.json, "Print one JSON object instead of text");
-  command->footer("Example: vnreg info models/small.vnr");
+  command->footer("Example: vnreg info models/vnreg.vnr");
   return command;
 }
 

@@ -25,8 +25,6 @@ constexpr float least_across_target = 0.2f;
 constexpr float most_along_difference = 0.3f;
 // Cosine between the second normals, when the pose is fixed by the first.
 constexpr float least_second_agreement = 0.9f;
-// How far a point may be from the surface to speak for a pose, in spacings.
-constexpr float probe_tolerance = 2.4f;
 // Of at most probe_points.
 constexpr float least_probe = 8.0f;
 // Pairs in a plane are alike: of a larger group, so many are tried, evenly.

@@ -18,7 +18,7 @@ constexpr double point_weight = 0.05;
 // Relative to the mean diagonal: what keeps the system solvable when nothing matches.
 constexpr double damping = 1e-9;
 // In radians and in radii.
-constexpr double smallest_step = 1e-5;
+constexpr double smallest_step = 1e-4;
 
 /// The sums of a Gauss-Newton step in the unknowns (rotation vector, translation).
 class NormalEquations {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "engine/hypotheses.hpp"
+#include "engine/match_hypotheses.hpp"
 #include "engine/refine.hpp"
 #include "engine/stopwatch.hpp"
 #include "engine/verify.hpp"
@@ -18,8 +19,8 @@ constexpr Index everything = most_surface_points;
 
 // Lengths below are in spacings of the sparser surface, unless they say radii.
 
-// First comparison: of this many hypotheses, those with the best probes.
-constexpr Index compared_hypotheses = 1500;
+// Of the hypotheses of each origin, so many with the best probes are compared on more points.
+constexpr Index compared_hypotheses = 600;
 constexpr Index compared_points = 128;
 constexpr float compared_tolerance = 1.9f;
 // Refinement of the best that differ by more than this.
@@ -31,8 +32,8 @@ constexpr float second_tolerance = 1.4f;
 // Refinement on all points.
 constexpr double final_degrees = 3;
 constexpr float final_radii = 0.09f;
-constexpr RefineStage final_refinements[] = {{everything, 1.9f, 6, Search::cell},
-                                             {everything, 1.0f, 8, Search::exact}};
+constexpr RefineStage final_refinements[] = {{512, 1.9f, 3, Search::cell},
+                                             {everything, 1.0f, 4, Search::exact}};
 constexpr float final_tolerance = 1.0f;
 // Poses closer than this count as one answer.
 constexpr double alternative_degrees = 15;
@@ -63,10 +64,11 @@ RefineStage scaled(RefineStage stage, float spacing) noexcept {
   return stage;
 }
 
-/// Brings the hypotheses of all chunks together; leaves those with the best probes, by two-sided
-/// score. Returns their number.
-Index compare_hypotheses(Workspace& w) noexcept {
-  VerifiedWorkspace& v = w.verified;
+bool by_score(const Hypothesis& a, const Hypothesis& b) noexcept { return better(a, b); }
+
+/// Brings the hypotheses of all chunks of pairs together; leaves those with the best probes in
+/// front. Returns their number.
+Index gather_pair_hypotheses(VerifiedWorkspace& v) noexcept {
   Hypothesis* all = v.hypotheses.data();
   Index count = 0;
   for (Index chunk = 0; chunk < draw_chunks; ++chunk) {
@@ -74,19 +76,44 @@ Index compare_hypotheses(Workspace& w) noexcept {
     std::copy_n(all + chunk * kept_per_chunk, kept, all + count);
     count += kept;
   }
-  const auto order = [](const Hypothesis& a, const Hypothesis& b) { return better(a, b); };
-  const Index compared = std::min(count, compared_hypotheses);
-  std::nth_element(all, all + compared, all + count, order);
+  const Index best = std::min(count, compared_hypotheses);
+  std::nth_element(all, all + best, all + count, by_score);
+  return best;
+}
+
+/// Adds the hypotheses from matches that have the best probes behind the first `count`. Returns the
+/// number of all.
+Index add_match_hypotheses(Index from_matches, Index count, Workspace& w) noexcept {
+  // Behind those of pairs, should scores be equal.
+  constexpr std::uint32_t first_ordinal = 1u << 31;
+  VerifiedWorkspace& v = w.verified;
+  Hypothesis* added = v.hypotheses.data() + count;
+  parallel_for(w.threads, from_matches, [&](Index i, int) {
+    const Motion& motion = v.match.motions[static_cast<std::size_t>(i)];
+    added[i] = {motion, probe(motion, v.surface, probe_tolerance * v.spacing),
+                first_ordinal + static_cast<std::uint32_t>(i)};
+  });
+  const Index best = std::min(from_matches, compared_hypotheses);
+  std::nth_element(added, added + best, added + from_matches, by_score);
+  return count + best;
+}
+
+/// Sorts the most promising hypotheses by how well they explain a part of both surfaces. Returns
+/// their number.
+Index compare_hypotheses(Index from_matches, Workspace& w) noexcept {
+  VerifiedWorkspace& v = w.verified;
+  Hypothesis* all = v.hypotheses.data();
+  const Index count = add_match_hypotheses(from_matches, gather_pair_hypotheses(v), w);
   constexpr Index per_task = 16;
-  parallel_for(w.threads, (compared + per_task - 1) / per_task, [&](Index task, int) {
-    for (Index i = task * per_task; i < std::min((task + 1) * per_task, compared); ++i) {
+  parallel_for(w.threads, (count + per_task - 1) / per_task, [&](Index task, int) {
+    for (Index i = task * per_task; i < std::min((task + 1) * per_task, count); ++i) {
       all[i].score = two_sided_fit(all[i].motion, v.surface, compared_points,
                                    compared_tolerance * v.spacing, Search::cell)
                          .score();
     }
   });
-  std::sort(all, all + compared, order);
-  return compared;
+  std::sort(all, all + count, by_score);
+  return count;
 }
 
 /// Adds to the first `count` poses the best hypotheses that differ from each other.
@@ -151,6 +178,7 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
   VerifiedPoses result;
   if (!build_surfaces(w)) return result;
   propose_poses(seed, w);
+  const Index from_matches = v.match.motions.empty() ? 0 : propose_from_matches(w);
   times.hypotheses = watch.lap();
 
   ScoredPose* poses = v.poses.data();
@@ -158,7 +186,7 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
   for (const RigidTransform& pose : proposals) {
     poses[count++] = {in_units(pose, 1 / v.radius), 0};
   }
-  const Index compared = compare_hypotheses(w);
+  const Index compared = compare_hypotheses(from_matches, w);
   count = add_distinct(v.hypotheses.data(), compared, count, v.poses);
   parallel_for(w.threads, count, [&](Index i, int) {
     refine_if_better(first_refinements, second_points, second_tolerance, Search::cell, v, poses[i]);
@@ -170,7 +198,7 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
   count =
       keep_distinct(poses, count, VerifiedPoses::capacity, alternative_degrees, alternative_radii);
   for (Index i = 0; i < count; ++i) {
-    if (poses[i].score < alternative_share * poses[0].score) break;
+    if (i > 0 && poses[i].score < alternative_share * poses[0].score) break;
     result.pose[result.count++] = {in_units(poses[i].transform, v.radius), poses[i].score};
   }
   times.verify = watch.lap();

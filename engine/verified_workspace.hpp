@@ -4,16 +4,17 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/match_buffers.hpp"
 #include "engine/motion.hpp"
 #include "engine/surface.hpp"
 
 namespace vnreg::detail {
 
 /// Target points whose pairs go into the table.
-inline constexpr Index table_points = 400;
+inline constexpr Index table_points = 320;
 /// Source pairs are drawn in chunks, each of which keeps its best hypotheses. The chunks are the
 /// same for any number of threads.
-inline constexpr Index draw_chunks = 32;
+inline constexpr Index draw_chunks = 16;
 inline constexpr Index draws_per_chunk = 16;
 inline constexpr Index kept_per_chunk = 64;
 /// Poses that other registers may add to the hypotheses.
@@ -54,12 +55,15 @@ struct VerifiedWorkspace {
   double radius = 1;  // the unit of length of the surfaces, in network coordinates
   float spacing = 0;  // of the sparser surface, in that unit
   PairTable table;
-  std::vector<Hypothesis> hypotheses;  // kept_per_chunk of each chunk
-  std::vector<Index> kept;             // how many of them each chunk has found
-  std::vector<ScoredPose> poses;       // what is refined
+  MatchBuffers match;  // empty without descriptors
+  /// kept_per_chunk of each chunk, and behind those that are found, those from matches.
+  std::vector<Hypothesis> hypotheses;
+  std::vector<Index> kept;        // how many of them each chunk has found
+  std::vector<ScoredPose> poses;  // what is refined
 
   VerifiedWorkspace() = default;
-  explicit VerifiedWorkspace(Index max_points);
+  /// `encoded`: how many points of a cloud have descriptors, at most; 0 if the model makes none.
+  VerifiedWorkspace(Index max_points, Index encoded);
 };
 
 }  // namespace vnreg::detail

@@ -14,6 +14,10 @@ constexpr float first_probes_least = 4.0f;
 // samples of their own, no pose gets it.
 constexpr float coincidence_share = 0.5f;
 constexpr float coincidence_tolerance = 0.1f;  // of the other tolerance
+// The rest is for points in the plane of their match, to within this part of the other tolerance:
+// samples of one surface do not coincide, but they lie on each other's planes. (Validation shapes,
+// 75 % kept: recall 78 % without this factor, 82 to 83 % with 1, 0.7 and 0.5 of the tolerance.)
+constexpr float plane_tolerance = 0.7f;
 // Steps from a cell's point to the nearest one; the first is nearly always enough.
 constexpr int most_steps = 3;
 
@@ -98,12 +102,17 @@ struct Unmatched {
   }
 };
 
-float sum_of_agreement(const Matches& m, float per_limit) noexcept {
+float sum_of_agreement(const Matches& m, float tolerance) noexcept {
+  const float per_limit = 1 / (9 * tolerance * tolerance);
   const float per_coincidence = per_limit / (coincidence_tolerance * coincidence_tolerance);
+  const float per_plane = 1 / (plane_tolerance * plane_tolerance * tolerance * tolerance);
   float sum = 0;
 #pragma omp simd reduction(+ : sum)
   for (Index i = 0; i < m.count; ++i) {
-    const float near = kernel(m.squared[i] * per_limit);
+    const float height = (m.x[i] - m.nearest_x[i]) * m.normal_x[i] +
+                         (m.y[i] - m.nearest_y[i]) * m.normal_y[i] +
+                         (m.z[i] - m.nearest_z[i]) * m.normal_z[i];
+    const float near = kernel(m.squared[i] * per_limit) * kernel(height * height * per_plane);
     const float coincident = kernel(m.squared[i] * per_coincidence);
     sum += ((1 - coincidence_share) * near + coincidence_share * coincident) * m.agreement[i];
   }
@@ -121,7 +130,7 @@ Fit one_sided_fit(const Motion& motion, const Surface& moving, const Surface& fi
   for (Index first = 0; first < total; first += Matches::capacity) {
     match_points(motion, moving, first, std::min(Matches::capacity, total - first), fixed, search,
                  matches);
-    fit.agreement += sum_of_agreement(matches, 1 / limit);
+    fit.agreement += sum_of_agreement(matches, tolerance);
     unmatched.add(matches, limit);
   }
   const float per_point = 1 / static_cast<float>(total);

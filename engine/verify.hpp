@@ -49,6 +49,8 @@ struct Fit {
 Fit two_sided_fit(const Motion& motion, const Surface surface[2], Index points, float tolerance,
                   Search search) noexcept;
 
+/// How far a point may be from the surface to speak for a pose that is only probed, in spacings.
+inline constexpr float probe_tolerance = 2.4f;
 /// Up to `probe_points` points of the source: the sum of (1 - squared distance / tolerance^2), 0
 /// beyond. Gives up, and returns 0, when the first points promise nothing.
 inline constexpr Index probe_points = 40;

@@ -132,7 +132,11 @@ Workspace::Workspace(const ModelData& model, const Options& options, Index max_p
     allocate_paper(model, options, max_points, *this);
   }
   allocate_residual(max_points, residual);
-  if (options.mode == Mode::verified) verified = VerifiedWorkspace(max_points);
+  if (options.mode == Mode::verified) {
+    const Index encoded =
+        model.descriptor_model ? std::min(max_points, model.descriptor_model->arch.encoded) : 0;
+    verified = VerifiedWorkspace(max_points, encoded);
+  }
   // The runtime makes its threads at the first parallel region: now, not in the first align.
   parallel_for(threads, threads, [](Index, int) {});
 }

@@ -20,6 +20,13 @@ RigidTransform compose(const RigidTransform& a, const RigidTransform& b) noexcep
   return {a.rotation * b.rotation, a.rotation * b.translation + a.translation};
 }
 
+RotationFit fit_rotation(const Eigen::Matrix3d& h) noexcept {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(h, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d u = svd.matrixU();
+  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1.0;
+  return {u * svd.matrixV().transpose(), svd.singularValues()};
+}
+
 ProcrustesSolution procrustes(const Coordinates& x, const Coordinates& y, const float* weights,
                               Index count) noexcept {
   Eigen::Vector3d mean_x = Eigen::Vector3d::Zero();
@@ -40,11 +47,8 @@ ProcrustesSolution procrustes(const Coordinates& x, const Coordinates& y, const 
         weight_at(weights, i) * (vector_at(y, i) - mean_y) * (vector_at(x, i) - mean_x).transpose();
   }
   if (!h.allFinite() || !mean_x.allFinite() || !mean_y.allFinite()) return {};
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(h, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1.0;
-  const Eigen::Matrix3d rotation = u * svd.matrixV().transpose();
-  return {{rotation, mean_y - rotation * mean_x}, svd.singularValues()};
+  const RotationFit fit = fit_rotation(h);
+  return {{fit.rotation, mean_y - fit.rotation * mean_x}, fit.singular_values};
 }
 
 }  // namespace vnreg::kernels

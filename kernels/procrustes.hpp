@@ -19,6 +19,14 @@ struct RigidTransform {
 /// The transform that does b first, then a.
 RigidTransform compose(const RigidTransform& a, const RigidTransform& b) noexcept;
 
+struct RotationFit {
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d singular_values;  // of H, descending; the second is 0: no rotation is determined
+};
+
+/// The rotation R that maximises trace(R^T H) for H = sum y x^T, finite.
+RotationFit fit_rotation(const Eigen::Matrix3d& h) noexcept;
+
 struct ProcrustesSolution {
   RigidTransform transform;                                   // y = R x + t
   Eigen::Vector3d singular_values = Eigen::Vector3d::Zero();  // of H, descending
