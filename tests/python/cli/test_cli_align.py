@@ -262,17 +262,29 @@ def test_the_seed_chooses_the_points(vnreg: Program, model: Path, pair: tuple[Pa
     assert first["T_target_source"] != other["T_target_source"]
 
 
+@pytest.mark.parametrize("mode", ["paper", "verified"])
 @pytest.mark.parametrize(("bias", "code"), [(-50.0, NOT_SURE), (50.0, OK)])
 def test_the_exit_code_says_whether_the_pose_is_trusted(
-    vnreg: Program, model: Path, pair: tuple[Path, Path], tmp_path: Path, bias: float, code: int
+    vnreg: Program,
+    model: Path,
+    pair: tuple[Path, Path],
+    tmp_path: Path,
+    bias: float,
+    code: int,
+    mode: str,
 ) -> None:
     metadata, tensors = read_model(model)
-    calibration = {"bias": bias, "overlap": 0.0, "residual": 0.0}
-    metadata |= {f"calibration.{key}": value for key, value in calibration.items()}
+    names = ["overlap", "residual"]
+    if mode == "verified":
+        names = list(vnreg("align", *pair, "--json", "--model", model).json()["evidence"])
+    prefix = {"paper": "calibration.", "verified": "calibration.verified."}[mode]
+    metadata |= {prefix + "bias": bias} | {prefix + name: 0.0 for name in names}
     write_model(tmp_path / "calibrated.vnr", metadata, tensors)
     arguments = (
         "align",
         *pair,
+        "--mode",
+        mode,
         "--model",
         tmp_path / "calibrated.vnr",
         "-o",
