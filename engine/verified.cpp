@@ -20,14 +20,14 @@ constexpr Index everything = most_surface_points;
 // Lengths below are in spacings of the sparser surface, unless they say radii.
 
 // Of the hypotheses of each origin, so many with the best probes are compared on more points.
-constexpr Index compared_hypotheses = 600;
-constexpr Index compared_points = 128;
+constexpr Index compared_hypotheses = 300;
+constexpr Index compared_points = 96;
 constexpr float compared_tolerance = 1.9f;
 // Refinement of the best that differ by more than this.
 constexpr double distinct_degrees = 8;
 constexpr float distinct_radii = 0.15f;
-constexpr RefineStage first_refinements[] = {{170, 3.8f, 6, Search::cell}};
-constexpr Index second_points = 256;
+constexpr RefineStage first_refinements[] = {{128, 3.8f, 5, Search::cell}};
+constexpr Index second_points = 192;
 constexpr float second_tolerance = 1.4f;
 // Refinement on all points.
 constexpr double final_degrees = 3;

@@ -18,8 +18,6 @@ constexpr float coincidence_tolerance = 0.1f;  // of the other tolerance
 // samples of one surface do not coincide, but they lie on each other's planes. (Validation shapes,
 // 75 % kept: recall 78 % without this factor, 82 to 83 % with 1, 0.7 and 0.5 of the tolerance.)
 constexpr float plane_tolerance = 0.7f;
-// Steps from a cell's point to the nearest one; the first is nearly always enough.
-constexpr int most_steps = 3;
 
 /// The nearest of a point's neighbours, the point itself included.
 std::uint16_t step(const Surface& s, std::uint16_t from, float x, float y, float z) noexcept {
@@ -36,14 +34,8 @@ std::uint16_t step(const Surface& s, std::uint16_t from, float x, float y, float
 }
 
 std::uint16_t nearest(const Surface& s, Search search, float x, float y, float z) noexcept {
-  std::uint16_t at = s.grid.nearest(x, y, z);
-  if (search == Search::cell) return at;
-  for (int i = 0; i < most_steps; ++i) {
-    const std::uint16_t nearer = step(s, at, x, y, z);
-    if (nearer == at) break;
-    at = nearer;
-  }
-  return at;
+  const std::uint16_t at = s.grid.nearest(x, y, z);
+  return search == Search::cell ? at : step(s, at, x, y, z);
 }
 
 void move(const Motion& m, const Surface& s, Index first, Matches& out) noexcept {

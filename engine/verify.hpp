@@ -8,7 +8,7 @@ namespace vnreg::detail {
 
 enum class Search {
   cell,   // the point of the grid's cell: at most a cell's diagonal farther than the nearest
-  exact,  // from there to the nearest of its neighbours, as long as that is nearer
+  exact,  // the nearest of that point's neighbours: nearly always the nearest of all
 };
 
 /// Up to 64 moved points of one surface and their nearest points on the other.
