@@ -179,8 +179,9 @@ void bind_alternative(nb::module_& module) {
       .def_prop_ro(
           "T_target_source", [](const Alternative& a) { return pose_array(a.T_target_source); },
           "(4, 4) float64: maps source onto target, in input units.")
-      .def_ro("score", &Alternative::score,
-              "0 to 1: how far each cloud's surface lies on the other's.");
+      .def_ro(
+          "score", &Alternative::score,
+          "At most 1: how far each cloud's surface lies on the other's, less what contradicts it.");
 }
 
 void bind_result(nb::module_& module) {
@@ -212,9 +213,10 @@ void bind_result(nb::module_& module) {
               "Share of the points of both clouds with a neighbour within `inlier_distance`.")
       .def_ro("rmse", &Result::rmse, "Root mean square distance of those inliers, input units.")
       .def_ro("inlier_distance", &Result::inlier_distance, "Input units.")
-      .def_ro(
-          "score", &Result::score,
-          "Mode 'verified': 0 to 1, how far each cloud's surface lies on the other's; else NaN.")
+      .def_ro("score", &Result::score,
+              "Mode 'verified': at most 1, how far each cloud's surface lies on the other's, less "
+              "what\n"
+              "contradicts it; else NaN.")
       .def_prop_ro("alternatives", &alternative_list,
                    "Mode 'verified': the other poses that fit nearly as well, the best first.")
       .def_prop_ro(

@@ -111,7 +111,8 @@ struct StageTimes {  // milliseconds
 /// A pose that fits the clouds, and how well.
 struct Alternative {
   Pose T_target_source = identity_pose;
-  /// 0 to 1: how far each cloud's surface lies on the other's, where 1 means identical surfaces.
+  /// At most 1, of identical surfaces: how far each cloud's surface lies on the other's, less what
+  /// contradicts the pose; below 0 where more speaks against it.
   double score = 0;
 };
 

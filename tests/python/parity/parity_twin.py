@@ -54,7 +54,7 @@ class Twin:
 
     def __post_init__(self) -> None:
         model = vnreg.Model.load(self.path)
-        self._recorder = vnreg.Registrar(model, max_points=16384, record_stages=True)
+        self._recorder = vnreg.Registrar(model, mode="paper", max_points=16384, record_stages=True)
         self._reference = Reference(copy.deepcopy(self.network))
         self._exact = Reference(copy.deepcopy(self.network), torch.float64)
 
