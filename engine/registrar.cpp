@@ -183,8 +183,8 @@ Index checked_max_points(const ModelData& model, const Options& options) {
                 std::to_string(static_cast<int>(options.mode)));
   }
   if (options.mode == Mode::paper && model.arch.fine_iterations == 0) {
-    throw Error(ErrorCode::invalid_option, "mode", "coarse or verified (the model has no fine register)",
-                "paper");
+    throw Error(ErrorCode::invalid_option, "mode",
+                "coarse or verified (the model has no fine register)", "paper");
   }
   check_range("threads", options.threads, 1, 1024, true);
   const int fewest = std::max(64, static_cast<int>(model.arch.min_points()));

@@ -30,7 +30,8 @@ VNREG_API std::string_view version() noexcept;
 /// The instruction set this build was compiled for, for example "x86-64-v3".
 VNREG_API std::string_view instruction_set() noexcept;
 
-/// A borrowed cloud: `count` points, each three consecutive floats or doubles, `stride_bytes` apart.
+/// A borrowed cloud: `count` points, each three consecutive floats or doubles, `stride_bytes`
+/// apart.
 class PointsView {
  public:
   enum class Scalar { float32, float64 };
@@ -65,10 +66,10 @@ using Pose = std::array<double, 16>;
 inline constexpr Pose identity_pose{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 
 enum class Mode {
-  coarse,  // the global register alone (paper, section III-C)
-  paper,   // coarse, then the fine register (paper, sections III-C and III-D)
-  verified,  // these poses and many others, judged by how well they explain both clouds, and refined
-             // (the default; not part of the paper)
+  coarse,    // the global register alone (paper, section III-C)
+  paper,     // coarse, then the fine register (paper, sections III-C and III-D)
+  verified,  // these poses and many others, judged by how well they explain both clouds, and
+             // refined (the default; not part of the paper)
 };
 
 enum class Status {
@@ -76,9 +77,9 @@ enum class Status {
   low_confidence,  // a pose was found, but it is more likely wrong than right (confidence < 1/2)
   too_few_points,  // a cloud has fewer points than the network needs: no pose
   not_finite,      // a coordinate is NaN, infinite or beyond 1e300: no pose
-  degenerate,      // a cloud's points coincide or lie on a line, or no rotation is determined: no pose
-  ambiguous,       // mode verified: a pose was found, but another fits nearly as well (a symmetry);
-                   // it goes before low_confidence: it says more
+  degenerate,  // a cloud's points coincide or lie on a line, or no rotation is determined: no pose
+  ambiguous,   // mode verified: a pose was found, but another fits nearly as well (a symmetry);
+               // it goes before low_confidence: it says more
 };
 
 VNREG_API std::string_view to_string(Mode mode) noexcept;
@@ -97,14 +98,14 @@ struct Options {
   bool record_stages = false;
 };
 
-struct StageTimes {  // milliseconds
-  double prepare = 0;  // check, subsample, normalise, neighbourhoods
-  double encode = 0;   // the SE(3)-equivariant network on both clouds
-  double coarse = 0;   // global register
-  double fine = 0;     // elimination and the iterations of the fine register
+struct StageTimes {       // milliseconds
+  double prepare = 0;     // check, subsample, normalise, neighbourhoods
+  double encode = 0;      // the SE(3)-equivariant network on both clouds
+  double coarse = 0;      // global register
+  double fine = 0;        // elimination and the iterations of the fine register
   double hypotheses = 0;  // mode verified: normals, and poses proposed by pairs of points
-  double verify = 0;   // mode verified: comparison and refinement of the poses
-  double measure = 0;  // residual and overlap of the final pose
+  double verify = 0;      // mode verified: comparison and refinement of the poses
+  double measure = 0;     // residual and overlap of the final pose
   double total = 0;
 };
 
@@ -134,10 +135,10 @@ class Alternatives {
   std::size_t size_ = 0;
 };
 
-/// Row-major 6x6 covariance of a pose's error (w, v): rotation vector w in radians, then translation
-/// v in the units of the input. The error is a perturbation from the left, in the target's frame and
-/// about its origin: R_true = exp([w]x) R and t_true = exp([w]x) t + v for the pose (R, t), so
-/// T_true = [exp([w]x), v; 0, 1] * T_target_source.
+/// Row-major 6x6 covariance of a pose's error (w, v): rotation vector w in radians, then
+/// translation v in the units of the input. The error is a perturbation from the left, in the
+/// target's frame and about its origin: R_true = exp([w]x) R and t_true = exp([w]x) t + v for the
+/// pose (R, t), so T_true = [exp([w]x), v; 0, 1] * T_target_source.
 using Covariance = std::array<double, 36>;
 inline constexpr Covariance unknown_covariance = [] {
   Covariance c{};
@@ -153,10 +154,10 @@ struct Evidence {
   double covered = score;       // share of the points of both clouds that have a match in the other
   double contradicted = score;  // share without, where the other cloud should show something
   double beyond = score;        // share without, outside of what the other cloud shows
-  double residual = score;      // r.m.s. distance of matched points from the planes of their matches
-  double noise = score;         // r.m.s. distance of points from the planes of their own cloud
-  double certainty = score;     // log10 of the least eigenvalue of the information that a matched
-                                // point gives on the rotation: how well the shape holds it
+  double residual = score;   // r.m.s. distance of matched points from the planes of their matches
+  double noise = score;      // r.m.s. distance of points from the planes of their own cloud
+  double certainty = score;  // log10 of the least eigenvalue of the information that a matched
+                             // point gives on the rotation: how well the shape holds it
 
   static constexpr std::array<std::string_view, 8> names{
       "score", "margin", "covered", "contradicted", "beyond", "residual", "noise", "certainty"};
@@ -168,8 +169,8 @@ struct Evidence {
 
 struct Result {
   Status status = Status::degenerate;
-  bool has_pose = false;                      // false: the poses below are the identity
-  Pose T_target_source = identity_pose;       // target = T * source, in the units of the input
+  bool has_pose = false;                        // false: the poses below are the identity
+  Pose T_target_source = identity_pose;         // target = T * source, in the units of the input
   Pose T_target_source_coarse = identity_pose;  // the coarse register's answer alone; the identity
                                                 // where it has none (mode verified only)
   /// Mode verified: of T_target_source, provided that it is right. Else NaN.
@@ -177,15 +178,17 @@ struct Result {
   /// Probability that the pose is right: within 5 degrees and 0.2 of the longest side, in mode
   /// verified up to the object's symmetry. NaN where the model carries no calibration of the mode.
   double confidence = std::numeric_limits<double>::quiet_NaN();
-  /// Share of points (both clouds) whose nearest point in the other cloud is within `inlier_distance`.
+  /// Share of points (both clouds) whose nearest point in the other cloud is within
+  /// `inlier_distance`.
   double overlap = 0;
-  double rmse = 0;             // root mean square nearest-point distance of those inliers, input units
+  double rmse = 0;  // root mean square nearest-point distance of those inliers, input units
   double inlier_distance = 0;  // input units
-  /// Mode verified: the score of T_target_source, and the other poses that score at least 80 % of it
-  /// and differ from it and from each other by 15 degrees or 0.1 r.m.s. radii. Else NaN and none.
+  /// Mode verified: the score of T_target_source, and the other poses that score at least 80 % of
+  /// it and differ from it and from each other by 15 degrees or 0.1 r.m.s. radii. Else NaN and
+  /// none.
   double score = std::numeric_limits<double>::quiet_NaN();
   Alternatives alternatives;
-  Evidence evidence;  // mode verified; else NaN
+  Evidence evidence;              // mode verified; else NaN
   std::size_t points_source = 0;  // points used, after subsampling
   std::size_t points_target = 0;
   StageTimes ms;
