@@ -14,7 +14,7 @@ PEERS_DEBIAN := libusb-1.0-0 libgl1 libegl1 libidn2-0
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python check sanitize \
-        bench evaluate train data model clean
+        bench evaluate train train-paper data model clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -67,7 +67,10 @@ sanitize: debian-packages ## the C++ tests under address and undefined-behaviour
 data: setup ## sample the furniture models into data/furniture
 	$(PY) -m vnreg_train.cli build-data
 
-train: data ## train models/small.vnr's network from the start (hours); resumes
+train: data ## train models/vnreg.vnr's network from the start (hours); resumes
+	$(PY) -m vnreg_train.cli train vnreg
+
+train-paper: data ## train models/small.vnr's network, the paper's, from the start (hours); resumes
 	$(PY) -m vnreg_train.cli train small --stage coarse
 	$(PY) -m vnreg_train.cli train small --stage fine
 

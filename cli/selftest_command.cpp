@@ -211,20 +211,20 @@ Outcome replay(const std::string& model_path, const std::string& golden_path) {
 CLI::App* add_selftest_command(CLI::App& app, SelftestArguments& arguments) {
   CLI::App* command = app.add_subcommand(
       "selftest", "Replay a recorded run and compare every stage of the computation with it.");
-  command->add_option("--model", arguments.model, "Model file; default: the small model")
+  command->add_option("--model", arguments.model, "Model file; default: the built-in model's")
       ->type_name("FILE");
   command
       ->add_option("--golden", arguments.golden,
                    "Golden file; default: named like the model, with .golden.vnr")
       ->type_name("FILE");
   command->footer(
-      "Example: vnreg selftest --model models/small.vnr --golden models/small.golden.vnr\n"
+      "Example: vnreg selftest --model models/vnreg.vnr --golden models/vnreg.golden.vnr\n"
       "Exit codes: 0 every stage is equal, 1 one differs, 2 usage, 3 input.");
   return command;
 }
 
 Outcome run_selftest(const SelftestArguments& arguments) {
-  const std::string model = arguments.model.empty() ? shipped_model("small.vnr") : arguments.model;
+  const std::string model = arguments.model.empty() ? shipped_model("vnreg.vnr") : arguments.model;
   return replay(model, arguments.golden.empty() ? golden_beside(model) : arguments.golden);
 }
 

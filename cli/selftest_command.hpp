@@ -9,7 +9,7 @@
 namespace vnreg::cli {
 
 struct SelftestArguments {
-  std::string model;   // empty: small.vnr as installed, or in the source tree
+  std::string model;   // empty: vnreg.vnr as installed, or in the source tree
   std::string golden;  // empty: the file named like the model, with .golden.vnr
 };
 

@@ -1,5 +1,6 @@
 #include "engine/verified.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -20,14 +21,14 @@ constexpr Index everything = most_surface_points;
 // Lengths below are in spacings of the sparser surface, unless they say radii.
 
 // Of the hypotheses of each origin, so many with the best probes are compared on more points.
-constexpr Index compared_hypotheses = 300;
-constexpr Index compared_points = 96;
+constexpr Index compared_hypotheses = 600;
+constexpr Index compared_points = 128;
 constexpr float compared_tolerance = 1.9f;
 // Refinement of the best that differ by more than this.
 constexpr double distinct_degrees = 8;
 constexpr float distinct_radii = 0.15f;
-constexpr RefineStage first_refinements[] = {{128, 3.8f, 5, Search::cell}};
-constexpr Index second_points = 192;
+constexpr RefineStage first_refinements[] = {{170, 3.8f, 6, Search::cell}};
+constexpr Index second_points = 256;
 constexpr float second_tolerance = 1.4f;
 // Refinement on all points.
 constexpr double final_degrees = 3;
@@ -38,10 +39,10 @@ constexpr float final_tolerance = 1.0f;
 // Poses closer than this count as one answer.
 constexpr double alternative_degrees = 15;
 constexpr float alternative_radii = 0.1f;
-// An alternative scores at least this share of the best pose's score; ambiguous is one that scores
-// more than the second share.
-constexpr double alternative_share = 0.8;
-constexpr double ambiguous_share = 0.97;
+// Below the best pose's score, in parts of its size: how far an alternative may lie, and one so
+// near that which of both is right cannot be told.
+constexpr double alternative_gap = 0.2;
+constexpr double ambiguous_gap = 0.03;
 
 float cosine_of(double degrees) noexcept {
   return static_cast<float>(std::cos(degrees * std::numbers::pi / 180));
@@ -53,6 +54,17 @@ RigidTransform to_transform(const Motion& motion) noexcept {
       Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(motion.rotation).cast<double>();
   transform.translation = Eigen::Map<const Eigen::Vector3f>(motion.translation).cast<double>();
   return transform;
+}
+
+/// Scores may be negative: a gap is taken off their size.
+bool within_gap(double score, double best, double gap) noexcept {
+  return score >= best - gap * std::abs(best);
+}
+
+/// What came from float32 as a rotation to the last bit of float64.
+RigidTransform orthonormal(RigidTransform t) noexcept {
+  t.rotation = Eigen::Quaterniond(t.rotation).normalized().toRotationMatrix();
+  return t;
 }
 
 RigidTransform in_units(const RigidTransform& t, double factor) noexcept {
@@ -198,15 +210,16 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
   count =
       keep_distinct(poses, count, VerifiedPoses::capacity, alternative_degrees, alternative_radii);
   for (Index i = 0; i < count; ++i) {
-    if (i > 0 && poses[i].score < alternative_share * poses[0].score) break;
-    result.pose[result.count++] = {in_units(poses[i].transform, v.radius), poses[i].score};
+    if (!within_gap(poses[i].score, poses[0].score, alternative_gap)) break;
+    result.pose[result.count++] = {in_units(orthonormal(poses[i].transform), v.radius),
+                                   poses[i].score};
   }
   times.verify = watch.lap();
   return result;
 }
 
 bool ambiguous(const VerifiedPoses& poses) noexcept {
-  return poses.count > 1 && poses.pose[1].score > ambiguous_share * poses.pose[0].score;
+  return poses.count > 1 && within_gap(poses.pose[1].score, poses.pose[0].score, ambiguous_gap);
 }
 
 }  // namespace vnreg::detail

@@ -11,16 +11,16 @@
 namespace vnreg::detail {
 
 /// Target points whose pairs go into the table.
-inline constexpr Index table_points = 220;
+inline constexpr Index table_points = 320;
 /// Source pairs are drawn in chunks, each of which keeps its best hypotheses. The chunks are the
 /// same for any number of threads.
-inline constexpr Index draw_chunks = 10;
+inline constexpr Index draw_chunks = 16;
 inline constexpr Index draws_per_chunk = 16;
 inline constexpr Index kept_per_chunk = 64;
 /// Poses that other registers may add to the hypotheses.
 inline constexpr Index most_proposals = 2;
 /// Distinct hypotheses that are refined.
-inline constexpr Index refined_poses = 48;
+inline constexpr Index refined_poses = 64;
 /// Distinct poses that are refined on all points.
 inline constexpr Index final_poses = 12;
 
