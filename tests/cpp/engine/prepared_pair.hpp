@@ -2,7 +2,7 @@
 #pragma once
 
 #include <algorithm>
-#include <memory>
+#include <utility>
 
 #include "clouds.hpp"
 #include "engine/cloud.hpp"

@@ -108,5 +108,30 @@ TEST_CASE("describing clouds allocates nothing") {
   }
 }
 
+TEST_CASE("mode verified allocates nothing, with the shipped model") {
+  Random random(83);
+  const Points source = shape(1000, random), many = shape(5000, random), few = shape(24, random);
+  const Points target = moved(shape(900, random), random_motion(random, 1));
+  const Points equal(100, {1, 2, 3});
+  const Points none;
+  for (const int threads : {1, 2, 3}) {
+    Registrar registrar(Model::builtin(), {.threads = threads});
+    const long before = allocations;
+    const Result with_pose[] = {
+        registrar.align(source, target), registrar.align(source, many),
+        registrar.align(few, source),    registrar.align(many, few),
+        registrar.align(source, source),
+    };
+    const Status without[] = {registrar.align(equal, source).status,
+                              registrar.align(source, none).status};
+    const long after = allocations;
+    CAPTURE(threads);
+    REQUIRE(after == before);
+    for (const Result& result : with_pose) REQUIRE(result.has_pose);
+    REQUIRE(without[0] == Status::degenerate);
+    REQUIRE(without[1] == Status::too_few_points);
+  }
+}
+
 }  // namespace
 }  // namespace vnreg::test

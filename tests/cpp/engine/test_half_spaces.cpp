@@ -1,7 +1,9 @@
 // Where a cloud ends, and what lies beyond: against plain loops, and on clouds cut in half.
 #include "engine/half_spaces.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <functional>
 
 #include "clouds.hpp"
 #include "prepared_pair.hpp"

@@ -1,8 +1,10 @@
 // The shipped network's descriptors propose motions near the right one.
 #include "engine/match_hypotheses.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstring>
+#include <limits>
 
 #include "clouds.hpp"
 #include "prepared_pair.hpp"
@@ -31,7 +33,8 @@ double best_error_deg(const PreparedPair& pair, const std::vector<detail::Motion
   return best;
 }
 
-/// Farthest from where `truth` brings the source's centroid, of the motions within `degrees` of it.
+/// How far from where `truth` brings the source's centroid the nearest of the motions within
+/// `degrees` of it brings it.
 double offset_of_near(const PreparedPair& pair, const std::vector<detail::Motion>& motions,
                       const Eigen::Isometry3d& truth, double degrees) {
   double nearest = std::numeric_limits<double>::infinity();

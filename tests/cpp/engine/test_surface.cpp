@@ -1,6 +1,7 @@
 // What mode verified makes of a cloud: points in their tangent planes, with normals.
 #include "engine/surface.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "clouds.hpp"

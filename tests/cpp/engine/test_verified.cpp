@@ -1,6 +1,7 @@
 // Mode verified from end to end, with the shipped model.
 #include "engine/verified.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "clouds.hpp"

@@ -2,6 +2,7 @@
 #include "engine/verify.hpp"
 
 #include <catch2/catch.hpp>
+#include <limits>
 
 #include "clouds.hpp"
 #include "prepared_pair.hpp"
