@@ -72,7 +72,9 @@ TEST_CASE("of another sample and of half of it, too") {
     for (const Points& part : {other, cut_in_half(other, normal).first}) {
       PreparedPair pair(source, moved(part, truth));
       CAPTURE(trial, part.size());
-      REQUIRE(best_error_deg(pair, proposed(pair), truth) < 15);
+      const auto motions = proposed(pair);
+      REQUIRE(best_error_deg(pair, motions, truth) < 15);
+      REQUIRE(offset_of_near(pair, motions, truth, 15) < 0.05);
     }
   }
 }
