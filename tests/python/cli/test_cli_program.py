@@ -148,8 +148,8 @@ def test_an_installed_program_finds_its_files(
     share = tmp_path / "share" / "vnreg"
     share.mkdir(parents=True)
     shutil.copy(program_path, tmp_path / "bin" / "vnreg")
-    shutil.copy(model, share / "small.vnr")
-    shutil.copy(golden, share / "small.golden.vnr")
+    shutil.copy(model, share / "vnreg.vnr")
+    shutil.copy(golden, share / "vnreg.golden.vnr")
     run = subprocess.run(
         [tmp_path / "bin" / "vnreg", "selftest"],
         capture_output=True,
@@ -158,7 +158,7 @@ def test_an_installed_program_finds_its_files(
         check=False,
     )
     assert run.returncode == OK, run
-    assert str(share / "small.golden.vnr") in run.stdout
+    assert str(share / "vnreg.golden.vnr") in run.stdout
 
 
 @pytest.mark.skipif(
