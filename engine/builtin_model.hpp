@@ -6,7 +6,7 @@
 
 namespace vnreg::detail {
 
-/// The bytes of models/small.vnr; empty when the library was built without that file.
+/// The bytes of models/vnreg.vnr; empty when the library was built without that file.
 std::span<const std::byte> builtin_model_bytes() noexcept;
 
 }  // namespace vnreg::detail

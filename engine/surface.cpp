@@ -130,8 +130,10 @@ bool is_line(const Surface& s) noexcept {
   const auto count = static_cast<double>(s.count);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  // About a point of the surface: where all coincide, exact zeros are left, not rounding.
+  const Eigen::Vector3d first = point_at(s, 0);
   for (std::size_t i = 0; i < static_cast<std::size_t>(s.count); ++i) {
-    const Eigen::Vector3d p = point_at(s, i);
+    const Eigen::Vector3d p = point_at(s, i) - first;
     sum += p;
     squares += p * p.transpose();
   }
