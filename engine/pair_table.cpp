@@ -27,8 +27,8 @@ inline int angle_bin(float cosine) noexcept {
   const float c = absolute(cosine) < 1.0f ? absolute(cosine) : 1.0f;
   const float polynomial = 1.5707288f + c * (-0.2121144f + c * (0.0742610f + c * -0.0187293f));
   const float angle = std::sqrt(1.0f - c) * polynomial;
-  const int bin = static_cast<int>(angle * (static_cast<float>(angle_bins) * 2 /
-                                            std::numbers::pi_v<float>));
+  const int bin =
+      static_cast<int>(angle * (static_cast<float>(angle_bins) * 2 / std::numbers::pi_v<float>));
   return bin < angle_bins - 1 ? bin : angle_bins - 1;
 }
 
@@ -44,8 +44,8 @@ inline std::uint16_t key_of(const Surface& s, std::size_t i, std::size_t j) noex
   const int between = angle_bin(ax * bx + ay * by + az * bz);
   const float place = ((usable ? distance : least_distance) - least_distance) *
                       (distance_bins / (most_distance - least_distance));
-  const int bin = static_cast<int>(place) < distance_bins ? static_cast<int>(place)
-                                                          : distance_bins - 1;
+  const int bin =
+      static_cast<int>(place) < distance_bins ? static_cast<int>(place) : distance_bins - 1;
   const int key = ((bin * angle_bins + first) * angle_bins + second) * angle_bins + between;
   return static_cast<std::uint16_t>(usable ? key : no_pair_key);
 }

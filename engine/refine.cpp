@@ -96,11 +96,11 @@ class NormalEquations {
 
   Matrix6 matrix_ = Matrix6::Zero();  // lower triangle
   Vector6 right_ = Vector6::Zero();
-  double weights_ = 0;                                  // sum w
-  Eigen::Vector3d sum_ = Eigen::Vector3d::Zero();       // sum w x
-  Eigen::Matrix3d squares_ = Eigen::Matrix3d::Zero();   // sum w x x^T
-  Eigen::Vector3d offset_ = Eigen::Vector3d::Zero();    // sum w e
-  Eigen::Vector3d torque_ = Eigen::Vector3d::Zero();    // sum w x cross e
+  double weights_ = 0;                                 // sum w
+  Eigen::Vector3d sum_ = Eigen::Vector3d::Zero();      // sum w x
+  Eigen::Matrix3d squares_ = Eigen::Matrix3d::Zero();  // sum w x x^T
+  Eigen::Vector3d offset_ = Eigen::Vector3d::Zero();   // sum w e
+  Eigen::Vector3d torque_ = Eigen::Vector3d::Zero();   // sum w x cross e
 };
 
 RigidTransform motion_of(const Vector6& step) noexcept {

@@ -125,8 +125,8 @@ Workspace::Workspace(const ModelData& model, const Options& options, Index max_p
   for (Cloud& c : cloud) c = Cloud(max_points);
   for (ThreadScratch& s : scratch) s.neighbours = kernels::NeighbourScratch(max_points);
   if (model.descriptor_model) {
-    descriptors = DescriptorWorkspace(*model.descriptor_model, max_points, threads,
-                                      options.record_stages);
+    descriptors =
+        DescriptorWorkspace(*model.descriptor_model, max_points, threads, options.record_stages);
     for (Features& f : features) allocate(f.global, 3 * padded(model.arch.channels_global));
   } else {
     allocate_paper(model, options, max_points, *this);

@@ -85,7 +85,7 @@ struct Workspace {
   Features features[2];
   FineBuffers fine;
   ResidualBuffers residual;
-  VerifiedWorkspace verified;  // empty in the other modes
+  VerifiedWorkspace verified;       // empty in the other modes
   DescriptorWorkspace descriptors;  // of architecture `vnreg`, whose `features` hold global alone
   std::vector<ThreadScratch> scratch;
   StageRecorder recorder;

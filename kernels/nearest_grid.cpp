@@ -44,8 +44,10 @@ struct Cells {
   Cells(const float* first_centre, float size) noexcept {
     for (Index i = 0; i < block_cells; ++i) {
       x[i] = first_centre[0] + size * static_cast<float>(i % NearestGrid::block);
-      y[i] = first_centre[1] + size * static_cast<float>(i / NearestGrid::block % NearestGrid::block);
-      z[i] = first_centre[2] + size * static_cast<float>(i / (NearestGrid::block * NearestGrid::block));
+      y[i] =
+          first_centre[1] + size * static_cast<float>(i / NearestGrid::block % NearestGrid::block);
+      z[i] = first_centre[2] +
+             size * static_cast<float>(i / (NearestGrid::block * NearestGrid::block));
     }
     std::fill_n(squared, block_cells, std::numeric_limits<float>::infinity());
     std::fill_n(place, block_cells, 0);
@@ -121,8 +123,7 @@ void NearestGrid::fill(const SpatialIndex& index, Index first, Index last,
         for (Index i = 0; i < SpatialIndex::leaf_size; ++i) {
           const Index p = leaf * SpatialIndex::leaf_size + i;
           if (squared[i] > limit_squared) continue;
-          block_of_cells.offer(points.x[p], points.y[p], points.z[p],
-                               static_cast<std::int32_t>(p));
+          block_of_cells.offer(points.x[p], points.y[p], points.z[p], static_cast<std::int32_t>(p));
         }
       }
     }

@@ -49,7 +49,8 @@ class NearestGrid {
     const float place = (value - low_[axis]) * per_size_;
     // In this order NaN gives 0.
     const float raised = place > 0.0f ? place : 0.0f;
-    return static_cast<Index>(static_cast<std::int32_t>(raised < last_[axis] ? raised : last_[axis]));
+    return static_cast<Index>(
+        static_cast<std::int32_t>(raised < last_[axis] ? raised : last_[axis]));
   }
 
   float low_[3] = {0, 0, 0};

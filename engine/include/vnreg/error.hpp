@@ -11,14 +11,14 @@
 namespace vnreg {
 
 enum class ErrorCode {
-  file_unreadable,       // the file cannot be opened or read
-  not_a_model,           // the magic bytes are wrong
-  unsupported_version,   // written by a newer major version
-  corrupt_model,         // a field, checksum, offset or size contradicts the specification
-  wrong_architecture,    // valid file, but not an architecture this build can run
-  missing_tensor,        // a name or shape of the architecture is absent or different
-  invalid_option,        // an Options field is out of its range
-  unsupported_cpu,       // this build needs instructions that the processor lacks
+  file_unreadable,      // the file cannot be opened or read
+  not_a_model,          // the magic bytes are wrong
+  unsupported_version,  // written by a newer major version
+  corrupt_model,        // a field, checksum, offset or size contradicts the specification
+  wrong_architecture,   // valid file, but not an architecture this build can run
+  missing_tensor,       // a name or shape of the architecture is absent or different
+  invalid_option,       // an Options field is out of its range
+  unsupported_cpu,      // this build needs instructions that the processor lacks
 };
 
 /// A failure with everything needed to act on it: what is wrong, where, and both values.
