@@ -6,8 +6,7 @@ MatchBuffers::MatchBuffers(Index encoded) {
   const auto points = static_cast<std::size_t>(encoded);
   const auto most = static_cast<std::size_t>(most_matches);
   similarity.resize(points * points);
-  for (kernels::Floats* buffer :
-       {&row_sum, &column_sum, &column_weight, &source_significance, &target_significance}) {
+  for (kernels::Floats* buffer : {&row_sum, &column_sum, &column_weight}) {
     buffer->resize(points);
   }
   matches.reserve(2 * points);

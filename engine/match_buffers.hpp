@@ -30,7 +30,6 @@ struct Match {
 struct MatchBuffers {
   kernels::Floats similarity;  // source x target
   kernels::Floats row_sum, column_sum, column_weight;
-  kernels::Floats source_significance, target_significance;
   std::vector<Match> matches;
   kernels::Floats place[2][3];             // of the matches' points, per cloud and axis
   kernels::Floats compatibility, support;  // matches x matches

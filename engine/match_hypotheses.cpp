@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "engine/descriptors.hpp"
+#include "kernels/linear.hpp"
 
 namespace vnreg::detail {
 namespace {
@@ -28,10 +29,6 @@ RowMajorMap rows_of(kernels::Floats& values, Index rows, Index columns) noexcept
 Eigen::Map<const kernels::RowMajorMatrix> rows_of(const kernels::Floats& values, Index rows,
                                                   Index columns) noexcept {
   return {values.data(), rows, columns};
-}
-
-float log_sigmoid(float logit) noexcept {
-  return logit < 0 ? logit - std::log1p(std::exp(logit)) : -std::log1p(std::exp(-logit));
 }
 
 /// similarity = exp(<local, local'> + <context, context'> - largest), and its sums.
@@ -64,29 +61,21 @@ void compare_descriptors(const CloudDescriptors& source, const CloudDescriptors&
   }
 }
 
-/// weight[i] = log P(the best match of i is right).
-void measure_significance(const CloudDescriptors& d, kernels::Floats& weight) noexcept {
-  for (std::size_t i = 0; i < static_cast<std::size_t>(d.count); ++i) {
-    weight[i] = log_sigmoid(d.significance[i]);
-  }
-}
-
 /// The two best partners of every source point, by dual softmax and significance; of all these, the
 /// best most_matches, the best first.
 void select_matches(const CloudDescriptors& source, const CloudDescriptors& target,
                     MatchBuffers& b) noexcept {
   constexpr float smallest = 1e-30f;
   const Index columns = target.count;
-  measure_significance(source, b.source_significance);
-  measure_significance(target, b.target_significance);
-  // exp(log significance - log sum), so that a row needs products only.
   for (std::size_t c = 0; c < static_cast<std::size_t>(columns); ++c) {
-    b.column_weight[c] = std::exp(b.target_significance[c]) / std::max(b.column_sum[c], smallest);
+    b.column_weight[c] =
+        kernels::sigmoid(target.significance[c]) / std::max(b.column_sum[c], smallest);
   }
   b.matches.clear();
   for (std::size_t r = 0; r < static_cast<std::size_t>(source.count); ++r) {
     const float* row = b.similarity.data() + static_cast<Index>(r) * columns;
-    const float row_weight = std::exp(b.source_significance[r]) / std::max(b.row_sum[r], smallest);
+    const float row_weight =
+        kernels::sigmoid(source.significance[r]) / std::max(b.row_sum[r], smallest);
     Match best[2];
     for (std::size_t c = 0; c < static_cast<std::size_t>(columns); ++c) {
       const float weight = row[c] * row[c] * row_weight * b.column_weight[c];

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/rigid.hpp"
+
 namespace vnreg::detail {
 namespace {
 
@@ -132,8 +134,7 @@ RigidTransform refine(const RigidTransform& start, const Surface surface[2],
     pose = kernels::compose(motion_of(step), pose);
     if (step.cwiseAbs().maxCoeff() < smallest_step) break;
   }
-  pose.rotation = Eigen::Quaterniond(pose.rotation).normalized().toRotationMatrix();
-  return pose;
+  return orthonormal(pose);
 }
 
 }  // namespace vnreg::detail

@@ -1,5 +1,7 @@
 #include "engine/rigid.hpp"
 
+#include <Eigen/Geometry>
+
 namespace vnreg::detail {
 
 void move_points(const kernels::RigidTransform& transform, const kernels::Coordinates& points,
@@ -14,6 +16,11 @@ void move_points(const kernels::RigidTransform& transform, const kernels::Coordi
     y[i] = static_cast<float>(r(1, 0) * px + r(1, 1) * py + r(1, 2) * pz + t(1));
     z[i] = static_cast<float>(r(2, 0) * px + r(2, 1) * py + r(2, 2) * pz + t(2));
   }
+}
+
+kernels::RigidTransform orthonormal(const kernels::RigidTransform& transform) noexcept {
+  return {Eigen::Quaterniond(transform.rotation).normalized().toRotationMatrix(),
+          transform.translation};
 }
 
 kernels::RigidTransform inverse(const kernels::RigidTransform& transform) noexcept {

@@ -1,6 +1,5 @@
 #include "engine/verified.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -8,6 +7,7 @@
 #include "engine/hypotheses.hpp"
 #include "engine/match_hypotheses.hpp"
 #include "engine/refine.hpp"
+#include "engine/rigid.hpp"
 #include "engine/stopwatch.hpp"
 #include "engine/verify.hpp"
 
@@ -59,12 +59,6 @@ RigidTransform to_transform(const Motion& motion) noexcept {
 /// Scores may be negative: a gap is taken off their size.
 bool within_gap(double score, double best, double gap) noexcept {
   return score >= best - gap * std::abs(best);
-}
-
-/// What came from float32 as a rotation to the last bit of float64.
-RigidTransform orthonormal(RigidTransform t) noexcept {
-  t.rotation = Eigen::Quaterniond(t.rotation).normalized().toRotationMatrix();
-  return t;
 }
 
 RigidTransform in_units(const RigidTransform& t, double factor) noexcept {

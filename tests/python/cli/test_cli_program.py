@@ -161,9 +161,13 @@ def test_an_installed_program_finds_its_files(
     assert str(share / "vnreg.golden.vnr") in run.stdout
 
 
-@pytest.mark.skipif(
-    not (repository / "models" / "small.golden.vnr").is_file(), reason="no model is shipped"
-)
-def test_the_shipped_model_replays(vnreg: Program) -> None:
+@pytest.mark.parametrize("name", ["small", "vnreg"])
+def test_the_shipped_models_replay(vnreg: Program, name: str) -> None:
+    run = vnreg("selftest", "--model", repository / "models" / f"{name}.vnr")
+    assert (run.code, run.stderr) == (OK, ""), run.stdout
+
+
+def test_selftest_replays_the_built_in_model_by_default(vnreg: Program) -> None:
     run = vnreg("selftest")
     assert (run.code, run.stderr) == (OK, ""), run.stdout
+    assert "vnreg.golden.vnr" in run.stdout
