@@ -26,9 +26,11 @@ struct Point {
 
 template <class Scalar>
 Point read_point(const PointsView& points, std::size_t i) noexcept {
+  const auto* x = static_cast<const std::byte*>(points.data()) + i * points.stride_bytes();
   Scalar xyz[3];
-  std::memcpy(xyz, static_cast<const std::byte*>(points.data()) + i * points.stride_bytes(),
-              sizeof(xyz));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::memcpy(xyz + axis, x + axis * points.axis_stride_bytes(), sizeof(Scalar));
+  }
   return {static_cast<double>(xyz[0]), static_cast<double>(xyz[1]), static_cast<double>(xyz[2])};
 }
 
@@ -37,12 +39,22 @@ inline bool usable(const Point& p) noexcept {  // false for NaN, too
          std::abs(p.z) <= largest_coordinate;
 }
 
-/// The points with the smallest hashes, in the order of the input, by a heap of fixed size.
-void choose(std::size_t count, std::uint64_t seed, std::vector<Cloud::Candidate>& chosen) noexcept {
+// Points between two looks at the clock: a fraction of a millisecond.
+constexpr std::size_t points_per_look = 8192;
+
+bool time_is_up(std::size_t i, Deadline& deadline) noexcept {
+  return i % points_per_look == 0 && deadline.passed();
+}
+
+/// The points with the smallest hashes, in the order of the input, by a heap of fixed size. Stops
+/// short when the deadline passes.
+void choose(std::size_t count, std::uint64_t seed, Deadline& deadline,
+            std::vector<Cloud::Candidate>& chosen) noexcept {
   const std::size_t kept = chosen.size();
   for (std::size_t i = 0; i < kept; ++i) chosen[i] = {counter_hash(seed, i), i};
   std::make_heap(chosen.begin(), chosen.end());
   for (std::size_t i = kept; i < count; ++i) {
+    if (time_is_up(i, deadline)) return;
     const Cloud::Candidate candidate{counter_hash(seed, i), i};
     if (!(candidate < chosen.front())) continue;
     std::pop_heap(chosen.begin(), chosen.end());
@@ -54,13 +66,15 @@ void choose(std::size_t count, std::uint64_t seed, std::vector<Cloud::Candidate>
 }
 
 template <class Scalar>
-bool take_points(const PointsView& points, std::uint64_t seed, Cloud& cloud) noexcept {
+bool take_points(const PointsView& points, std::uint64_t seed, Deadline& deadline,
+                 Cloud& cloud) noexcept {
   for (std::size_t i = 0; i < points.size(); ++i) {
+    if (time_is_up(i, deadline)) return false;
     if (!usable(read_point<Scalar>(points, i))) return false;
   }
   const bool all = points.size() <= static_cast<std::size_t>(cloud.max_points);
   cloud.count = all ? static_cast<Index>(points.size()) : cloud.max_points;
-  if (!all) choose(points.size(), seed, cloud.candidates);
+  if (!all) choose(points.size(), seed, deadline, cloud.candidates);
   for (std::size_t i = 0; i < static_cast<std::size_t>(cloud.count); ++i) {
     const Point p = read_point<Scalar>(points, all ? i : cloud.candidates[i].index);
     cloud.xyz[3 * i] = p.x;
@@ -116,7 +130,7 @@ Cloud::Cloud(Index max)
   }
 }
 
-Status gather(const PointsView& points, Index min_points, std::uint64_t seed,
+Status gather(const PointsView& points, Index min_points, std::uint64_t seed, Deadline& deadline,
               Cloud& cloud) noexcept {
   cloud.count = 0;
   if (points.data() == nullptr || points.size() < static_cast<std::size_t>(min_points)) {
@@ -124,8 +138,8 @@ Status gather(const PointsView& points, Index min_points, std::uint64_t seed,
     return Status::too_few_points;
   }
   const bool finite = points.scalar() == PointsView::Scalar::float32
-                          ? take_points<float>(points, seed, cloud)
-                          : take_points<double>(points, seed, cloud);
+                          ? take_points<float>(points, seed, deadline, cloud)
+                          : take_points<double>(points, seed, deadline, cloud);
   if (!finite) return Status::not_finite;
   return measure(cloud) ? Status::ok : Status::degenerate;
 }

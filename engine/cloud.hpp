@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/architecture.hpp"
+#include "engine/deadline.hpp"
 #include "kernels/neighbours.hpp"
 #include "kernels/spatial_index.hpp"
 #include "vnreg/vnreg.hpp"
@@ -40,8 +41,9 @@ struct Cloud {
   kernels::Floats spacing_squared;               // to the nearest other point
 };
 
-/// Checks the points, takes at most max_points of them, and finds centroid and r.m.s. radius.
-Status gather(const PointsView& points, Index min_points, std::uint64_t seed,
+/// Checks the points, takes at most max_points of them, and finds centroid and r.m.s. radius. The
+/// answer means nothing if the deadline passes meanwhile.
+Status gather(const PointsView& points, Index min_points, std::uint64_t seed, Deadline& deadline,
               Cloud& cloud) noexcept;
 
 /// Network coordinates: float32((p - centroid) / scale). False if they leave the range in which

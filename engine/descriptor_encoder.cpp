@@ -34,19 +34,18 @@ struct Tile {
   float* z() const noexcept { return f.z.data() + scalar_rows() * first; }
 };
 
-/// Runs over all tiles of both clouds.
+/// Runs over all tiles of the clouds.
 class Pass {
  public:
-  Pass(const DescriptorModel& model, const Cloud clouds[2], int threads, DescriptorWorkspace& w)
-      : model_(model), clouds_(clouds), threads_(threads), w_(w) {}
+  Pass(const DescriptorModel& model, const Cloud clouds[2], Sides sides, const Threads& threads,
+       DescriptorWorkspace& w)
+      : model_(model), clouds_(clouds), sides_(sides), threads_(threads), w_(w) {}
 
   template <class Task>
   void operator()(const Task& task) const noexcept {
-    const Index source_tiles = encoded_tiles(w_.features[0].out.count);
-    const Index tiles = source_tiles + encoded_tiles(w_.features[1].out.count);
-    parallel_for(threads_, tiles, [&](Index i, int thread) {
-      const Index side = i < source_tiles ? 0 : 1;
-      const Index first = (i - side * source_tiles) * encoded_tile;
+    const auto tiles = [&](Index side) { return encoded_tiles(w_.features[side].out.count); };
+    parallel_for_parts(threads_, sides_, tiles, [&](Index side, Index tile, int thread) {
+      const Index first = tile * encoded_tile;
       DescriptorFeatures& f = w_.features[side];
       task(Tile{model_, clouds_[side], f, w_.scratch[static_cast<std::size_t>(thread)], first,
                 std::min(encoded_tile, f.out.count - first)});
@@ -56,7 +55,8 @@ class Pass {
  private:
   const DescriptorModel& model_;
   const Cloud* clouds_;
-  int threads_;
+  Sides sides_;
+  Threads threads_;
   DescriptorWorkspace& w_;
 };
 
@@ -377,19 +377,20 @@ void write_global(const DescriptorModel& model, DescriptorFeatures& f) noexcept 
 
 class Recording {
  public:
-  Recording(const DescriptorModel& model, DescriptorWorkspace& w, StageRecorder& recorder)
-      : model_(model), w_(w), recorder_(recorder) {}
+  Recording(const DescriptorModel& model, Sides sides, DescriptorWorkspace& w,
+            StageRecorder& recorder)
+      : model_(model), sides_(sides), w_(w), recorder_(recorder) {}
 
   void vectors(const char* name, kernels::Floats DescriptorFeatures::*buffer,
                Index channels) const noexcept {
-    for (Index side = 0; side < 2; ++side) {
+    for (const Index side : sides_) {
       recorder_.vectors(side_name(side), name, (w_.features[side].*buffer).data(), padded(channels),
                         channels, w_.features[side].out.count, encoded_tile);
     }
   }
   void scalars(const char* name, kernels::Floats DescriptorFeatures::*buffer,
                Index channels) const noexcept {
-    for (Index side = 0; side < 2; ++side) {
+    for (const Index side : sides_) {
       matrix(side, name, w_.features[side].*buffer, padded(channels), channels);
     }
   }
@@ -406,7 +407,7 @@ class Recording {
   }
   void results() const noexcept {
     const DescriptorArchitecture& a = model_.arch;
-    for (Index side = 0; side < 2; ++side) {
+    for (const Index side : sides_) {
       const CloudDescriptors& out = w_.features[side].out;
       const char* prefix = side_name(side);
       recorder_.list(prefix, "encoded", out.encoded.data(), out.count);
@@ -428,18 +429,20 @@ class Recording {
   }
 
   const DescriptorModel& model_;
+  Sides sides_;
   DescriptorWorkspace& w_;
   StageRecorder& recorder_;
 };
 
 }  // namespace
 
-void encode_descriptors(const DescriptorModel& model, const Cloud clouds[2], std::uint64_t seed,
-                        int threads, DescriptorWorkspace& w, StageRecorder& recorder) noexcept {
+void encode_descriptors(const DescriptorModel& model, const Cloud clouds[2], Sides sides,
+                        std::uint64_t seed, const Threads& threads, DescriptorWorkspace& w,
+                        StageRecorder& recorder) noexcept {
   const Index c = padded(model.arch.vectors);
-  const Pass for_each_tile(model, clouds, threads, w);
-  const Recording record(model, w, recorder);
-  for (Index side = 0; side < 2; ++side) {
+  const Pass for_each_tile(model, clouds, sides, threads, w);
+  const Recording record(model, sides, w, recorder);
+  for (const Index side : sides) {
     select_encoded(clouds[side], model.arch.encoded, seed, w.features[side]);
   }
   for_each_tile(run_point_stage);
@@ -450,24 +453,26 @@ void encode_descriptors(const DescriptorModel& model, const Cloud clouds[2], std
   for_each_tile(run_local_stage);
   record.vectors("local.v", &DescriptorFeatures::kept_v, model.arch.vectors);
   record.z("local.z");
-  for (DescriptorFeatures& f : w.features) pool_scalars(model, f);
+  for (const Index side : sides) pool_scalars(model, w.features[side]);
 
   for (std::size_t i = 0; i < model.context_blocks.size(); ++i) {
     for_each_tile([i](const Tile& t) { run_context_block(t, i); });
-    for (DescriptorFeatures& f : w.features) {
+    for (const Index side : sides) {
+      DescriptorFeatures& f = w.features[side];
       pool(model, f);
       kernels::multiply(model.context_blocks[i].pool, f.mean.data(), c, 3, f.constant.data(), c);
     }
   }
   for_each_tile(run_context_end);
   record.v("context.v");
-  for (DescriptorFeatures& f : w.features) {
+  for (const Index side : sides) {
+    DescriptorFeatures& f = w.features[side];
     pool(model, f);
     kernels::multiply(model.context_products_pooled, f.mean.data(), c, 3, f.partners.data(),
                       model.context_products_pooled.padded_rows());
   }
   for_each_tile(run_heads);
-  for (DescriptorFeatures& f : w.features) write_global(model, f);
+  for (const Index side : sides) write_global(model, w.features[side]);
   record.z("context.z");
   record.results();
 }

@@ -42,7 +42,7 @@ void run_block(const VnBlock& block, Floats Features::*from, Floats Features::*t
 
 /// features.sums to features.mean, and on to the constants of the next block.
 void pool(Index rows, const VnBlock& next, Workspace& w) noexcept {
-  for (Index side = 0; side < 2; ++side) {
+  for (const Index side : w.sides) {
     Features& f = w.features[side];
     const Index points = w.cloud[side].count;
     kernels::mean_of_tiles(f.sums.data(), rows, tile_count(points), points, f.mean.data());
@@ -51,7 +51,7 @@ void pool(Index rows, const VnBlock& next, Workspace& w) noexcept {
 }
 
 void record(const char* name, Floats Features::*buffer, Index channels, Workspace& w) noexcept {
-  for (Index side = 0; side < 2; ++side) {
+  for (const Index side : w.sides) {
     w.recorder.vectors(side_name(side), name, (w.features[side].*buffer).data(),
                        kernels::padded(channels), channels, w.cloud[side].count, tile_points);
   }
@@ -82,7 +82,7 @@ void run_pooled_block(const VnBlock& block, Workspace& w) noexcept {
     kernels::sum_tile(scratch.block.activated_hidden.data(), hidden, width,
                       tile_sums(f, hidden, tile));
   });
-  for (Index side = 0; side < 2; ++side) {
+  for (const Index side : w.sides) {
     Features& f = w.features[side];
     const Index points = w.cloud[side].count;
     const Index rows = block.out_rows();
@@ -96,7 +96,7 @@ void run_pooled_block(const VnBlock& block, Workspace& w) noexcept {
 /// features.global = VN-linear(VN-ReLU(features.pooled)).
 void run_global_head(const ModelData& model, Workspace& w) noexcept {
   const Index rows = kernels::padded(model.arch.channels_global);
-  for (Index side = 0; side < 2; ++side) {
+  for (const Index side : w.sides) {
     Features& f = w.features[side];
     const Index direction_rows = model.global_direction.padded_rows();
     const auto pooled = kernels::tile_view<const float>(f.pooled.data(), rows, 1);
@@ -180,7 +180,7 @@ void record_local_stages(const ModelData& model, Workspace& w) noexcept {
   const Architecture& a = model.arch;
   record("network2.block1", &Features::local, a.channels_local, w);
   record("frame", &Features::frame, 3, w);
-  for (Index side = 0; side < 2; ++side) {
+  for (const Index side : w.sides) {
     const Features& f = w.features[side];
     const Index points = w.cloud[side].count;
     w.recorder.matrix(side_name(side), "descriptor", f.descriptors.data(),
@@ -213,7 +213,8 @@ void encode_global(const ModelData& model, Workspace& w) noexcept {
 
 void encode_local(const ModelData& model, Workspace& w) noexcept {
   const Index channels = model.arch.channels_local;
-  for (Features& f : w.features) {
+  for (const Index side : w.sides) {
+    Features& f = w.features[side];
     kernels::set_constants(model.network2[0], f.global.data(), f.constants);
   }
   run_block(model.network2[0], &Features::latent, &Features::other, w);

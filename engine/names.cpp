@@ -31,6 +31,10 @@ std::string_view to_string(Status status) noexcept {
       return "degenerate";
     case Status::ambiguous:
       return "ambiguous";
+    case Status::timed_out:
+      return "timed_out";
+    case Status::cancelled:
+      return "cancelled";
   }
   return "unknown";
 }

@@ -13,10 +13,9 @@ void search_neighbours(const ModelData& model, Workspace& w) noexcept {
   const auto tasks = [&](Index side) {
     return (w.cloud[side].index.leaves() + leaves_per_task - 1) / leaves_per_task;
   };
-  const Index source_tasks = tasks(0);
-  parallel_for(w.threads, source_tasks + tasks(1), [&](Index i, int thread) {
-    Cloud& cloud = w.cloud[i < source_tasks ? 0 : 1];
-    const Index first = (i < source_tasks ? i : i - source_tasks) * leaves_per_task;
+  parallel_for_parts(w.threads, w.sides, tasks, [&](Index side, Index task, int thread) {
+    Cloud& cloud = w.cloud[side];
+    const Index first = task * leaves_per_task;
     const Index last = std::min(first + leaves_per_task, cloud.index.leaves());
     kernels::mean_neighbour_offsets(cloud.index, model.arch.neighbours, first, last,
                                     w.scratch[static_cast<std::size_t>(thread)].neighbours,
@@ -51,11 +50,13 @@ void write_edges(const Cloud& cloud, Index tile, float* edges) noexcept {
 }  // namespace
 
 void find_neighbourhoods(const ModelData& model, Workspace& w) noexcept {
-  parallel_for(w.threads, 2, [&](Index side, int) {
-    w.cloud[side].index.build(w.cloud[side].coordinates(), w.cloud[side].count);
-  });
+  parallel_for_parts(
+      w.threads, w.sides, [](Index) { return 1; },
+      [&](Index side, Index, int) {
+        w.cloud[side].index.build(w.cloud[side].coordinates(), w.cloud[side].count);
+      });
   search_neighbours(model, w);
-  for (Index side = 0; side < 2; ++side) {
+  for (const Index side : w.sides) {
     const Cloud& cloud = w.cloud[side];
     w.recorder.coordinates(side_name(side), "points", cloud.coordinates(), cloud.count);
   }
@@ -65,7 +66,7 @@ void find_edges(Workspace& w) noexcept {
   w.for_each_tile([&](Index side, Index tile, ThreadScratch&) {
     write_edges(w.cloud[side], tile, w.features[side].edges.data());
   });
-  for (Index side = 0; side < 2; ++side) {
+  for (const Index side : w.sides) {
     w.recorder.vectors(side_name(side), "edge", w.features[side].edges.data(), 3, 3,
                        w.cloud[side].count, tile_points);
   }

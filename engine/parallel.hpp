@@ -1,5 +1,6 @@
 // One loop shape for all parallel work: independent tasks, handed out dynamically. No result
-// depends on which thread runs a task. With one thread no parallel region is opened.
+// depends on which thread runs a task. With one thread no parallel region is opened. Once a call's
+// deadline has passed, its tasks are left out.
 #pragma once
 
 #ifdef __SANITIZE_THREAD__
@@ -10,11 +11,30 @@
 #include <omp.h>
 #endif
 
+#include <span>
+
+#include "engine/deadline.hpp"
 #include "kernels/packets.hpp"
 
 namespace vnreg::detail {
 
 using kernels::Index;
+
+/// How many threads work for a registrar, and until when.
+struct Threads {
+  int count;
+  Deadline* deadline;
+
+  operator int() const noexcept { return count; }  // NOLINT: implicit on purpose
+};
+
+/// Which clouds of a pair a stage works on, ascending: 0 is the source, 1 the target.
+using Sides = std::span<const Index>;
+inline constexpr Index both_sides[2] = {0, 1};
+
+inline bool contains(Sides sides, Index side) noexcept {
+  return !sides.empty() && (sides.front() == side || sides.back() == side);
+}
 
 /// Calls task(i, thread) for every i < count, with 0 <= thread < threads.
 template <class Task>
@@ -38,6 +58,31 @@ void parallel_for(int threads, Index count, const Task& task) noexcept {
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
   for (Index i = 0; i < count; ++i) task(i, omp_get_thread_num());
 #endif
+}
+
+/// The same within a call's deadline: tasks that would begin after it are left out, and
+/// threads.deadline->expired() tells so.
+template <class Task>
+void parallel_for(const Threads& threads, Index count, const Task& task) noexcept {
+  parallel_for(threads.count, count, [&](Index i, int thread) {
+    if (!threads.deadline->passed()) task(i, thread);
+  });
+}
+
+/// Calls task(side, part, thread) for every part < parts(side) of all sides, as one list of tasks.
+template <class Parts, class Task>
+void parallel_for_parts(const Threads& threads, Sides sides, const Parts& parts,
+                        const Task& task) noexcept {
+  Index total = 0;
+  for (const Index side : sides) total += parts(side);
+  parallel_for(threads, total, [&](Index i, int thread) {
+    const Index first_parts = parts(sides.front());
+    if (i < first_parts) {
+      task(sides.front(), i, thread);
+    } else {
+      task(sides.back(), i - first_parts, thread);
+    }
+  });
 }
 
 /// The number of threads that `requested` (0: what OpenMP says) stands for.

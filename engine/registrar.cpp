@@ -1,5 +1,7 @@
 // The pipeline, in the order in which data flows (docs/design.md).
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <span>
 #include <utility>
 
@@ -13,6 +15,8 @@
 #include "engine/fine.hpp"
 #include "engine/model_data.hpp"
 #include "engine/neighbourhood.hpp"
+#include "engine/options.hpp"
+#include "engine/prepared_cloud.hpp"
 #include "engine/residual.hpp"
 #include "engine/stopwatch.hpp"
 #include "engine/verified.hpp"
@@ -24,17 +28,32 @@ namespace detail {
 
 using kernels::RigidTransform;
 
+/// A cloud as it comes in.
+struct Input {
+  PointsView points;
+  const PreparedData* prepared = nullptr;  // if not null, `points` are its points
+};
+
 struct RegistrarState {
-  RegistrarState(Model m, const Options& o, Index max_points)
-      : model(std::move(m)), options(o), workspace(model.data(), o, max_points) {}
+  RegistrarState(Model m, const Options& o, Index points)
+      : model(std::move(m)), options(o), max_points(points), workspace(model.data(), o, points) {}
+
+  /// What another kind of registrar has prepared counts as points.
+  Input input(const PreparedCloud& cloud) const noexcept;
+  const Result& align(const Input& source, const Input& target) noexcept;
+  std::shared_ptr<const PreparedData> prepare(const PointsView& points);
 
   Model model;
   Options options;
+  Index max_points;
   Workspace workspace;
   Result result;
 };
 
 namespace {
+
+// A cloud whose radius exceeds a prepared one's by no more is measured in the prepared one's unit.
+constexpr double most_excess = 1.25;
 
 /// The worse of both statuses, in the order of the checks.
 Status first_failure(Status source, Status target) noexcept {
@@ -44,36 +63,71 @@ Status first_failure(Status source, Status target) noexcept {
   return Status::ok;
 }
 
-/// One length for both clouds; 0 when it is not a positive number.
-double common_scale(const ModelData& model, const Cloud cloud[2]) noexcept {
-  if (model.arch.rms_radius == 0.0) return 1.0;
-  const double scale = std::max(cloud[0].rms_radius, cloud[1].rms_radius) / model.arch.rms_radius;
-  return std::isfinite(scale) ? scale : 0.0;
+/// What the scale of a cloud alone would be.
+double scale_of(const ModelData& model, const Cloud& cloud) noexcept {
+  return model.arch.rms_radius == 0.0 ? 1.0 : cloud.rms_radius / model.arch.rms_radius;
 }
 
-/// Points to network coordinates and edge vectors.
-Status prepare(const ModelData& model, const Options& options, const PointsView clouds[2],
-               Workspace& w, double& scale) noexcept {
+/// One length for both clouds, and which of them have to be computed in it. 0 when it is not a
+/// positive number.
+double common_scale(const ModelData& model, const Input inputs[2], Workspace& w) noexcept {
+  const double scales[2] = {scale_of(model, w.cloud[0]), scale_of(model, w.cloud[1])};
+  const Index larger = scales[0] >= scales[1] ? 0 : 1;
+  const double largest = scales[larger];
+  w.sides = both_sides;
+  if (!std::isfinite(largest)) return 0.0;
+  bool fits[2];
+  double scale = largest;
+  if (inputs[larger].prepared == nullptr && inputs[1 - larger].prepared != nullptr &&
+      largest <= most_excess * scales[1 - larger]) {
+    scale = scales[1 - larger];
+  }
+  for (Index side = 0; side < 2; ++side) {
+    fits[side] = inputs[side].prepared != nullptr && inputs[side].prepared->scale == scale;
+  }
+  if (fits[0] || fits[1]) w.sides = w.sides.subspan(fits[0] ? 1 : 0, fits[0] && fits[1] ? 0 : 1);
+  return scale;
+}
+
+/// The points used, centroid and radius.
+Status take(const ModelData& model, const Options& options, const Input& input, Workspace& w,
+            Cloud& cloud) noexcept {
+  if (input.prepared == nullptr) {
+    return gather(input.points, model.arch.min_points(), options.seed, w.deadline, cloud);
+  }
+  cloud = input.prepared->cloud;
+  return input.prepared->status;
+}
+
+Status unfinished(const Deadline& deadline) noexcept {
+  return deadline.cancelled() ? Status::cancelled : Status::timed_out;
+}
+
+/// Points to network coordinates and neighbourhoods.
+Status prepare(const ModelData& model, const Options& options, const Input inputs[2], Workspace& w,
+               double& scale) noexcept {
   Status status[2];
+  for (Cloud& cloud : w.cloud) cloud.count = 0;
   parallel_for(w.threads, 2, [&](Index side, int) {
-    status[side] = gather(clouds[side], model.arch.min_points(), options.seed, w.cloud[side]);
+    status[side] = take(model, options, inputs[side], w, w.cloud[side]);
   });
+  if (w.deadline.expired()) return unfinished(w.deadline);
   if (const Status s = first_failure(status[0], status[1]); s != Status::ok) return s;
-  scale = common_scale(model, w.cloud);
+  scale = common_scale(model, inputs, w);
   if (scale == 0.0) return Status::degenerate;
-  for (Cloud& cloud : w.cloud) {
-    if (!normalize(scale, cloud)) return Status::degenerate;
+  for (const Index side : w.sides) {
+    if (!normalize(scale, w.cloud[side])) return Status::degenerate;
   }
   find_neighbourhoods(model, w);
-  return Status::ok;
+  return w.deadline.expired() ? unfinished(w.deadline) : Status::ok;
 }
 
 /// The features that the coarse register needs, and with architecture `vnreg` all others.
 void encode(const ModelData& model, const Options& options, Workspace& w) noexcept {
   if (!model.descriptor_model) return encode_global(model, w);
-  encode_descriptors(*model.descriptor_model, w.cloud, options.seed, w.threads, w.descriptors,
-                     w.recorder);
-  for (Index side = 0; side < 2; ++side) {
+  encode_descriptors(*model.descriptor_model, w.cloud, w.sides, options.seed, w.threads,
+                     w.descriptors, w.recorder);
+  for (const Index side : w.sides) {
     w.features[side].global = w.descriptors.features[side].out.global;
   }
 }
@@ -94,6 +148,18 @@ bool finite(const Pose& pose) noexcept {
   return Eigen::Map<const Eigen::Matrix<double, 16, 1>>(pose.data()).allFinite();
 }
 
+/// The deadline has passed: the pose found until then (or null), which nothing has judged.
+Status give_up(const RigidTransform* found, double scale, const Workspace& w,
+               Result& result) noexcept {
+  const Status status = unfinished(w.deadline);
+  if (found == nullptr || status == Status::cancelled) return status;
+  const Pose pose = user_pose(*found, scale, w.cloud);
+  if (!finite(pose)) return status;
+  result.has_pose = true;
+  result.T_target_source = pose;
+  return status;
+}
+
 /// What mode verified says about its answer, the first of the poses, and the other ones.
 Status judge(const VerifiedPoses& poses, const ModelData& model, double scale, const Workspace& w,
              Result& result) noexcept {
@@ -112,18 +178,22 @@ Status judge(const VerifiedPoses& poses, const ModelData& model, double scale, c
 }
 
 /// Everything but the total time. Leaves `result` without a pose unless it has a finite one.
-Status run(const ModelData& model, const Options& options, const PointsView clouds[2], Workspace& w,
+Status run(const ModelData& model, const Options& options, const Input inputs[2], Workspace& w,
            Result& result) noexcept {
   Stopwatch watch;
   double scale = 1;
-  const Status prepared = prepare(model, options, clouds, w, scale);
+  const Status prepared = prepare(model, options, inputs, w, scale);
   result.points_source = static_cast<std::size_t>(w.cloud[0].count);
   result.points_target = static_cast<std::size_t>(w.cloud[1].count);
   result.ms.prepare = watch.lap();
   if (prepared != Status::ok) return prepared;
 
   encode(model, options, w);
+  for (Index side = 0; side < 2; ++side) {
+    if (!contains(w.sides, side)) load_features(*inputs[side].prepared, side, w);
+  }
   result.ms.encode = watch.lap();
+  if (w.deadline.expired()) return unfinished(w.deadline);
   const CoarsePose coarse = register_coarse(model, w);
   result.ms.coarse = watch.lap();
   // A symmetric cloud may leave the features without a rotation, but not its points.
@@ -137,12 +207,16 @@ Status run(const ModelData& model, const Options& options, const PointsView clou
     result.ms.encode += watch.lap();
     transform = register_fine(model, coarse.transform, w);
     result.ms.fine = watch.lap();
+    if (w.deadline.expired()) return give_up(&coarse.transform, scale, w, result);
   }
   VerifiedPoses poses;
   if (options.mode == Mode::verified) {
     const RigidTransform proposals[most_proposals] = {coarse_transform, transform};
     const std::size_t count = !coarse.determined ? 0 : w.local ? 2 : 1;
     poses = register_verified({proposals, count}, options.seed, w, result.ms);
+    if (w.deadline.expired()) {
+      return give_up(poses.count > 0 ? &poses.pose[0].transform : nullptr, scale, w, result);
+    }
     if (poses.count == 0) return Status::degenerate;
     transform = poses.pose[0].transform;
     watch.lap();  // register_verified has taken its own times
@@ -168,31 +242,55 @@ Status run(const ModelData& model, const Options& options, const PointsView clou
   return status;
 }
 
-void check_range(const char* field, int value, int min, int max, bool zero_allowed) {
-  if ((zero_allowed && value == 0) || (value >= min && value <= max)) return;
-  throw Error(ErrorCode::invalid_option, field,
-              (zero_allowed ? "0 or " : "") + std::to_string(min) + " to " + std::to_string(max),
-              std::to_string(value));
-}
-
-/// Checks the options against the model; returns the number of points to make room for.
-Index checked_max_points(const ModelData& model, const Options& options) {
-  if (options.mode != Mode::coarse && options.mode != Mode::paper &&
-      options.mode != Mode::verified) {
-    throw Error(ErrorCode::invalid_option, "mode", "coarse, paper or verified",
-                std::to_string(static_cast<int>(options.mode)));
+/// All that a side can have alone, with the other one empty.
+Status run_alone(const ModelData& model, const Options& options, const PointsView& points,
+                 Workspace& w, double& scale) noexcept {
+  constexpr Index side = 0;
+  const Status gathered =
+      gather(points, model.arch.min_points(), options.seed, w.deadline, w.cloud[side]);
+  if (w.deadline.expired()) return unfinished(w.deadline);
+  if (gathered != Status::ok) return gathered;
+  scale = scale_of(model, w.cloud[side]);
+  if (!std::isfinite(scale) || !normalize(scale, w.cloud[side])) return Status::degenerate;
+  w.sides = Sides(both_sides).first(1);
+  find_neighbourhoods(model, w);
+  encode(model, options, w);
+  if (w.local) encode_local(model, w);
+  if (options.mode == Mode::verified) {
+    w.verified.radius = network_radius(w.cloud[side]);
+    fit_surfaces(w);
   }
-  if (options.mode == Mode::paper && model.arch.fine_iterations == 0) {
-    throw Error(ErrorCode::invalid_option, "mode",
-                "coarse or verified (the model has no fine register)", "paper");
-  }
-  check_range("threads", options.threads, 1, 1024, true);
-  const int fewest = std::max(64, static_cast<int>(model.arch.min_points()));
-  check_range("max_points", options.max_points, fewest, 16384, true);
-  return options.max_points == 0 ? model.arch.points : Index{options.max_points};
+  return w.deadline.expired() ? unfinished(w.deadline) : Status::ok;
 }
 
 }  // namespace
+
+Input RegistrarState::input(const PreparedCloud& cloud) const noexcept {
+  const PreparedData& prepared = cloud.data();
+  const bool serves = prepared.serves(model.data(), options, max_points);
+  return {prepared.points(), serves ? &prepared : nullptr};
+}
+
+const Result& RegistrarState::align(const Input& source, const Input& target) noexcept {
+  Stopwatch watch;
+  result = Result{};
+  workspace.deadline.start(options);
+  workspace.recorder.clear();
+  const Input inputs[2] = {source, target};
+  result.status = run(model.data(), options, inputs, workspace, result);
+  result.ms.total = watch.lap();
+  return result;
+}
+
+std::shared_ptr<const PreparedData> RegistrarState::prepare(const PointsView& points) {
+  workspace.deadline.start(options);
+  auto prepared = std::make_shared<PreparedData>(model, options, max_points);
+  prepared->status = run_alone(model.data(), options, points, workspace, prepared->scale);
+  store(workspace, 0, *prepared);
+  workspace.recorder.clear();
+  return prepared;
+}
+
 }  // namespace detail
 
 Registrar::Registrar(Model model, Options options) {
@@ -206,15 +304,22 @@ Registrar::Registrar(Registrar&&) noexcept = default;
 Registrar& Registrar::operator=(Registrar&&) noexcept = default;
 
 const Result& Registrar::align(PointsView source, PointsView target) noexcept {
-  detail::RegistrarState& s = *state_;
-  detail::Stopwatch watch;
-  s.result = Result{};
-  s.workspace.recorder.clear();
-  const PointsView clouds[2] = {source, target};
-  s.result.status = detail::run(s.model.data(), s.options, clouds, s.workspace, s.result);
-  s.result.ms.total = watch.lap();
-  return s.result;
+  return state_->align({source}, {target});
 }
+
+const Result& Registrar::align(PointsView source, const PreparedCloud& target) noexcept {
+  return state_->align({source}, state_->input(target));
+}
+
+const Result& Registrar::align(const PreparedCloud& source, PointsView target) noexcept {
+  return state_->align(state_->input(source), {target});
+}
+
+const Result& Registrar::align(const PreparedCloud& source, const PreparedCloud& target) noexcept {
+  return state_->align(state_->input(source), state_->input(target));
+}
+
+PreparedCloud Registrar::prepare(PointsView cloud) { return PreparedCloud(state_->prepare(cloud)); }
 
 const std::vector<Stage>& Registrar::stages() const noexcept {
   return state_->workspace.recorder.stages();

@@ -28,18 +28,6 @@ constexpr Index extent_points = 512;
 // The grid is exact out to where the widest comparison ends.
 constexpr float reach_in_spacings = 6.0f;
 
-/// R.m.s. distance to the centroid, in network coordinates.
-double network_radius(const Cloud& cloud) noexcept {
-  double squares = 0;
-  for (const kernels::Floats* axis : {&cloud.x, &cloud.y, &cloud.z}) {
-    for (std::size_t i = 0; i < static_cast<std::size_t>(cloud.count); ++i) {
-      const auto value = static_cast<double>((*axis)[i]);
-      squares += value * value;
-    }
-  }
-  return std::sqrt(squares / static_cast<double>(cloud.count));
-}
-
 /// Of the numbers 0 .. 2^bits - 1, that whose bits are those of v in reverse order.
 std::uint32_t reversed(std::uint32_t v, int bits) noexcept {
   std::uint32_t r = 0;
@@ -146,14 +134,24 @@ bool is_line(const Surface& s) noexcept {
 
 /// Calls task(side, first, last, scratch) for every chunk of `chunk` of the total(side) parts.
 template <class Total, class Task>
-void for_each_chunk(Workspace& w, Index chunk, const Total& total, const Task& task) noexcept {
-  const Index chunks[2] = {(total(0) + chunk - 1) / chunk, (total(1) + chunk - 1) / chunk};
-  parallel_for(w.threads, chunks[0] + chunks[1], [&](Index i, int thread) {
-    const Index side = i < chunks[0] ? 0 : 1;
-    const Index first = (i - side * chunks[0]) * chunk;
+void for_each_chunk(Workspace& w, Sides sides, Index chunk, const Total& total,
+                    const Task& task) noexcept {
+  const auto chunks = [&](Index side) { return (total(side) + chunk - 1) / chunk; };
+  parallel_for_parts(w.threads, sides, chunks, [&](Index side, Index i, int thread) {
+    const Index first = i * chunk;
     task(side, first, std::min(first + chunk, total(side)),
          w.scratch[static_cast<std::size_t>(thread)].neighbours);
   });
+}
+
+/// The unit of length of the surfaces: that of a prepared cloud is in its surface already.
+double unit_of(const Workspace& w) noexcept {
+  double radius = 0;
+  for (Index side = 0; side < 2; ++side) {
+    if (!contains(w.sides, side)) return network_radius(w.cloud[side]);
+    radius = std::max(radius, network_radius(w.cloud[side]));
+  }
+  return radius;
 }
 
 }  // namespace
@@ -168,38 +166,55 @@ Surface::Surface(Index max_points) : index(std::min(max_points, most_surface_poi
   grid.allocate();
 }
 
-bool build_surfaces(Workspace& w) noexcept {
+double network_radius(const Cloud& cloud) noexcept {
+  double squares = 0;
+  for (const kernels::Floats* axis : {&cloud.x, &cloud.y, &cloud.z}) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(cloud.count); ++i) {
+      const auto value = static_cast<double>((*axis)[i]);
+      squares += value * value;
+    }
+  }
+  return std::sqrt(squares / static_cast<double>(cloud.count));
+}
+
+void fit_surfaces(Workspace& w) noexcept {
   Surface* surface = w.verified.surface;
-  w.verified.radius = std::max(network_radius(w.cloud[0]), network_radius(w.cloud[1]));
-  if (!(w.verified.radius > smallest_radius)) return false;
   const auto per_radius = static_cast<float>(1 / w.verified.radius);
-  parallel_for(w.threads, 2, [&](Index side, int) {
+  const auto whole = [](Index) { return 1; };
+  parallel_for_parts(w.threads, w.sides, whole, [&](Index side, Index, int) {
     take_points(w.cloud[side], per_radius, surface[side]);
     surface[side].index.build(surface[side].coordinates(), surface[side].count);
   });
   for_each_chunk(
-      w, leaves_per_task, [&](Index side) { return surface[side].index.leaves(); },
+      w, w.sides, leaves_per_task, [&](Index side) { return surface[side].index.leaves(); },
       [&](Index side, Index first, Index last, kernels::NeighbourScratch& scratch) {
         fit_planes(surface[side], first, last, scratch);
       });
-  float spacing = smallest_spacing;
-  for (Index side = 0; side < 2; ++side) {
+  parallel_for_parts(w.threads, w.sides, whole, [&](Index side, Index, int) {
     Surface& s = surface[side];
     s.spacing = std::sqrt(median(s.spread_squared.data(), s.count) /
                           static_cast<float>(surface_neighbours));
-    if (is_line(s)) return false;
-    spacing = std::max(spacing, s.spacing);
-  }
+    s.line = is_line(s);
+    flatten(s);
+  });
+}
+
+bool build_surfaces(Workspace& w) noexcept {
+  Surface* surface = w.verified.surface;
+  w.verified.radius = unit_of(w);
+  if (!(w.verified.radius > smallest_radius)) return false;
+  fit_surfaces(w);
+  if (surface[0].line || surface[1].line) return false;
+  const float spacing = std::max({smallest_spacing, surface[0].spacing, surface[1].spacing});
   w.verified.spacing = spacing;
+  // How far the grids are exact depends on both clouds: no part of a prepared one.
   const float reach = reach_in_spacings * spacing;
-  for (Index side = 0; side < 2; ++side)
-    surface[side].grid.place(surface[side].index, reach, reach);
+  for (Surface& s : w.verified.surface) s.grid.place(s.index, reach, reach);
   for_each_chunk(
-      w, blocks_per_task, [&](Index side) { return surface[side].grid.blocks(); },
+      w, both_sides, blocks_per_task, [&](Index side) { return surface[side].grid.blocks(); },
       [&](Index side, Index first, Index last, kernels::NeighbourScratch& scratch) {
         surface[side].grid.fill(surface[side].index, first, last, scratch);
       });
-  parallel_for(w.threads, 2, [&](Index side, int) { flatten(surface[side]); });
   return true;
 }
 

@@ -34,6 +34,7 @@ struct Surface {
   float spacing = 0;
   /// R.m.s. distance of the points given from their planes, by the median: noise, and curvature.
   float noise = 0;
+  bool line = false;  // or a point: it determines no rotation
   Extents extents{};
   kernels::SpatialIndex index;  // of the points given
   kernels::NearestGrid grid;
@@ -47,8 +48,15 @@ struct Surface {
   kernels::Coordinates coordinates() const noexcept { return {x.data(), y.data(), z.data()}; }
 };
 
-/// Fills workspace.verified.surface, .radius and .spacing from both clouds. False if a cloud is a
-/// line or a point: it determines no rotation.
+/// R.m.s. distance to the centroid, in network coordinates.
+double network_radius(const Cloud& cloud) noexcept;
+
+/// Points, planes and spacing of the surfaces of the clouds to compute, in units of
+/// workspace.verified.radius.
+void fit_surfaces(Workspace& workspace) noexcept;
+
+/// Fills workspace.verified.surface, .radius and .spacing from the clouds to compute (the surface
+/// of a prepared cloud must be there). False if a cloud is a line or a point.
 bool build_surfaces(Workspace& workspace) noexcept;
 
 }  // namespace vnreg::detail

@@ -135,7 +135,7 @@ Index add_distinct(const Hypothesis* hypotheses, Index available, Index count,
     });
     if (known) continue;
     chosen[number++] = motion;
-    poses[static_cast<std::size_t>(count++)] = {to_transform(motion), 0};
+    poses[static_cast<std::size_t>(count++)] = {to_transform(motion), hypotheses[i].score};
   }
   return count;
 }
@@ -186,6 +186,7 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
   propose_poses(seed, w);
   const Index from_matches = v.match.motions.empty() ? 0 : propose_from_matches(w);
   times.hypotheses = watch.lap();
+  if (w.deadline.expired()) return result;
 
   ScoredPose* poses = v.poses.data();
   Index count = 0;
@@ -193,6 +194,7 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
     poses[count++] = {in_units(pose, 1 / v.radius), 0};
   }
   const Index compared = compare_hypotheses(from_matches, w);
+  if (w.deadline.expired()) return result;
   count = add_distinct(v.hypotheses.data(), compared, count, v.poses);
   parallel_for(w.threads, count, [&](Index i, int) {
     refine_if_better(first_refinements, second_points, second_tolerance, Search::cell, v, poses[i]);

@@ -17,7 +17,8 @@ struct VerifiedPoses {
 
 /// `proposals` (at most most_proposals): poses of other registers, refined and compared like the
 /// best hypotheses. Sets ms.hypotheses and ms.verify of the times. No pose: the clouds determine no
-/// rotation.
+/// rotation, or the deadline passed before the hypotheses were compared; when it passes later, the
+/// best poses until then.
 VerifiedPoses register_verified(std::span<const kernels::RigidTransform> proposals,
                                 std::uint64_t seed, Workspace& workspace,
                                 StageTimes& times) noexcept;

@@ -118,10 +118,10 @@ void allocate_paper(const ModelData& model, const Options& options, Index max_po
 }  // namespace
 
 Workspace::Workspace(const ModelData& model, const Options& options, Index max_points)
-    : threads(thread_count(options.threads)),
+    : threads{thread_count(options.threads), &deadline},
       local(has_fine_register(model, options)),
       recorder(options.record_stages) {
-  scratch.resize(static_cast<std::size_t>(threads));
+  scratch.resize(static_cast<std::size_t>(threads.count));
   for (Cloud& c : cloud) c = Cloud(max_points);
   for (ThreadScratch& s : scratch) s.neighbours = kernels::NeighbourScratch(max_points);
   if (model.descriptor_model) {
@@ -138,7 +138,7 @@ Workspace::Workspace(const ModelData& model, const Options& options, Index max_p
     verified = VerifiedWorkspace(max_points, encoded);
   }
   // The runtime makes its threads at the first parallel region: now, not in the first align.
-  parallel_for(threads, threads, [](Index, int) {});
+  parallel_for(threads.count, threads.count, [](Index, int) {});
 }
 
 }  // namespace vnreg::detail

@@ -79,7 +79,10 @@ struct ThreadScratch {
 struct Workspace {
   Workspace(const ModelData& model, const Options& options, Index max_points);
 
-  int threads;
+  Deadline deadline;  // of the running call
+  Threads threads;
+  /// The clouds whose points and features the running call computes; the others were prepared.
+  Sides sides = both_sides;
   bool local;  // whether the local module and the fine register have memory
   Cloud cloud[2];
   Features features[2];
@@ -90,14 +93,14 @@ struct Workspace {
   std::vector<ThreadScratch> scratch;
   StageRecorder recorder;
 
-  /// Calls task(side, tile, scratch) for every tile of both clouds, in parallel.
+  /// Calls task(side, tile, scratch) for every tile of the clouds to compute, in parallel.
   template <class Task>
   void for_each_tile(const Task& task) noexcept {
-    const Index source_tiles = tile_count(cloud[0].count);
-    parallel_for(threads, source_tiles + tile_count(cloud[1].count), [&](Index i, int thread) {
-      const Index side = i < source_tiles ? 0 : 1;
-      task(side, i - side * source_tiles, scratch[static_cast<std::size_t>(thread)]);
-    });
+    parallel_for_parts(
+        threads, sides, [&](Index side) { return tile_count(cloud[side].count); },
+        [&](Index side, Index tile, int thread) {
+          task(side, tile, scratch[static_cast<std::size_t>(thread)]);
+        });
   }
 };
 

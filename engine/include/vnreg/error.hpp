@@ -19,6 +19,7 @@ enum class ErrorCode {
   missing_tensor,       // a name or shape of the architecture is absent or different
   invalid_option,       // an Options field is out of its range
   unsupported_cpu,      // this build needs instructions that the processor lacks
+  invalid_points,       // a cloud's layout cannot be read
 };
 
 /// A failure with everything needed to act on it: what is wrong, where, and both values.

@@ -6,8 +6,14 @@
 //   vnreg::Registrar registrar{model, {.threads = 1}};                // owns all working memory
 //   const vnreg::Result& result = registrar.align(source, target);    // hot path, never throws
 //
+//   vnreg::PreparedCloud part = registrar.prepare(target);            // many scans, one target
+//   registrar.align(scan, part);
+//
 // Conventions: target = R * source + t. Poses are 4x4, row-major, in the units of the input.
-// Thread safety: a Model is immutable and may be shared; use one Registrar per thread.
+//
+// Thread safety: Model and PreparedCloud are immutable and may be shared by any number of threads.
+// A Registrar or BatchRegistrar serves one call at a time: use one per thread. Cancellation may be
+// raised from any thread. The free functions may be called at the same time.
 #pragma once
 
 #include <array>
@@ -20,8 +26,10 @@
 #include <string_view>
 #include <vector>
 
+#include "vnreg/cancellation.hpp"
 #include "vnreg/error.hpp"
 #include "vnreg/export.hpp"
+#include "vnreg/points.hpp"
 
 namespace vnreg {
 
@@ -29,37 +37,6 @@ namespace vnreg {
 VNREG_API std::string_view version() noexcept;
 /// The instruction set this build was compiled for, for example "x86-64-v3".
 VNREG_API std::string_view instruction_set() noexcept;
-
-/// A borrowed cloud: `count` points, each three consecutive floats or doubles, `stride_bytes`
-/// apart.
-class PointsView {
- public:
-  enum class Scalar { float32, float64 };
-
-  PointsView(const float* xyz, std::size_t count, std::size_t stride_bytes = 3 * sizeof(float))
-      : data_(xyz), count_(count), stride_bytes_(stride_bytes), scalar_(Scalar::float32) {}
-  PointsView(const double* xyz, std::size_t count, std::size_t stride_bytes = 3 * sizeof(double))
-      : data_(xyz), count_(count), stride_bytes_(stride_bytes), scalar_(Scalar::float64) {}
-  PointsView(std::span<const std::array<float, 3>> points)  // NOLINT: implicit on purpose
-      : PointsView(reinterpret_cast<const float*>(points.data()), points.size()) {}
-  PointsView(std::span<const std::array<double, 3>> points)  // NOLINT: implicit on purpose
-      : PointsView(reinterpret_cast<const double*>(points.data()), points.size()) {}
-  PointsView(const std::vector<std::array<float, 3>>& points)  // NOLINT: implicit on purpose
-      : PointsView(std::span(points)) {}
-  PointsView(const std::vector<std::array<double, 3>>& points)  // NOLINT: implicit on purpose
-      : PointsView(std::span(points)) {}
-
-  const void* data() const noexcept { return data_; }
-  std::size_t size() const noexcept { return count_; }
-  std::size_t stride_bytes() const noexcept { return stride_bytes_; }
-  Scalar scalar() const noexcept { return scalar_; }
-
- private:
-  const void* data_;
-  std::size_t count_;
-  std::size_t stride_bytes_;
-  Scalar scalar_;
-};
 
 /// Row-major 4x4 homogeneous matrix.
 using Pose = std::array<double, 16>;
@@ -80,6 +57,9 @@ enum class Status {
   degenerate,  // a cloud's points coincide or lie on a line, or no rotation is determined: no pose
   ambiguous,   // mode verified: a pose was found, but another fits nearly as well (a symmetry);
                // it goes before low_confidence: it says more
+  timed_out,   // the time budget was spent; has_pose tells whether a pose was found by then, which
+               // nothing has judged: confidence, covariance and overlap are unknown
+  cancelled,   // Options::cancellation was raised: no pose
 };
 
 VNREG_API std::string_view to_string(Mode mode) noexcept;
@@ -96,6 +76,12 @@ struct Options {
   std::uint64_t seed = 0;
   /// Keep every intermediate activation for Registrar::stages(). Allocates; for tests and tools.
   bool record_stages = false;
+  /// Milliseconds after which align returns, with Status::timed_out unless it is done; 0 means no
+  /// limit, at most 1e9. The clock is read before every piece of work, the pieces of two clouds of
+  /// up to 4,096 points last less than a millisecond.
+  double time_budget_ms = 0;
+  /// Ends running calls when it is raised: see Cancellation. Not owned.
+  const Cancellation* cancellation = nullptr;
 };
 
 struct StageTimes {       // milliseconds
@@ -203,7 +189,9 @@ struct Stage {
 
 namespace detail {
 struct ModelData;
+struct PreparedData;
 struct RegistrarState;
+struct BatchState;
 }  // namespace detail
 
 /// Weights and hyper-parameters, checked and packed. Cheap to copy (shared, immutable).
@@ -229,6 +217,33 @@ class VNREG_API Model {
   std::shared_ptr<const detail::ModelData> data_;
 };
 
+/// A cloud with all that can be computed of it alone: its points, their neighbourhoods, its
+/// features and its surface. Made by Registrar::prepare(). Cheap to copy (shared, immutable).
+///
+/// The network sees both clouds of a pair in units of one length, the larger r.m.s. radius. A
+/// prepared cloud fixes it: aligned with a cloud whose radius is no larger, as a scan's is most of
+/// the time if the model is prepared, it gives the same bits as its points would. A radius up to
+/// 1.25 times as large is accepted, too, and measured in the prepared cloud's unit; beyond that,
+/// and where two prepared clouds differ in radius, the points of the smaller one are encoded again,
+/// which takes the time that it would without. Registrars with another model, max_points, seed or
+/// mode than that which made it take its points as if they had been given.
+class VNREG_API PreparedCloud {
+ public:
+  /// Status::ok, or why no pose can be found with it: too_few_points, not_finite, degenerate;
+  /// timed_out or cancelled when its registrar's limits were met.
+  Status status() const noexcept;
+  /// Points used, after subsampling.
+  std::size_t size() const noexcept;
+
+  const detail::PreparedData& data() const noexcept { return *data_; }
+
+ private:
+  friend class Registrar;
+  explicit PreparedCloud(std::shared_ptr<const detail::PreparedData> data)
+      : data_(std::move(data)) {}
+  std::shared_ptr<const detail::PreparedData> data_;
+};
+
 /// Aligns pairs of clouds with one model. Owns its working memory; one per thread.
 class VNREG_API Registrar {
  public:
@@ -243,6 +258,14 @@ class VNREG_API Registrar {
   /// The pose that maps `source` onto `target`. Valid until the next call. Never throws: look at
   /// `status` (any finite or non-finite input is allowed).
   const Result& align(PointsView source, PointsView target) noexcept;
+  /// The same with what was prepared before; allocates nothing either.
+  const Result& align(PointsView source, const PreparedCloud& target) noexcept;
+  const Result& align(const PreparedCloud& source, PointsView target) noexcept;
+  const Result& align(const PreparedCloud& source, const PreparedCloud& target) noexcept;
+
+  /// Does once what align would do for this cloud each time. Throws std::bad_alloc only; look at
+  /// the status of what it returns. What align returned before stays valid.
+  PreparedCloud prepare(PointsView cloud);
 
   /// What the last align computed, in the order of computation; empty unless record_stages is set.
   const std::vector<Stage>& stages() const noexcept;
@@ -251,7 +274,44 @@ class VNREG_API Registrar {
   std::unique_ptr<detail::RegistrarState> state_;
 };
 
+struct CloudPair {
+  PointsView source;
+  PointsView target;
+};
+
+/// Aligns many pairs, one per thread at a time: for throughput, where Registrar is for latency. The
+/// results are those of a Registrar, bit by bit.
+class VNREG_API BatchRegistrar {
+ public:
+  /// `options.threads` pairs are worked on at a time, each with working memory of its own; the time
+  /// budget is that of each pair. Throws Error (invalid_option, unsupported_cpu); stages cannot be
+  /// recorded.
+  explicit BatchRegistrar(Model model, Options options = {});
+  ~BatchRegistrar();
+  BatchRegistrar(BatchRegistrar&&) noexcept;
+  BatchRegistrar& operator=(BatchRegistrar&&) noexcept;
+  BatchRegistrar(const BatchRegistrar&) = delete;
+  BatchRegistrar& operator=(const BatchRegistrar&) = delete;
+
+  /// results[i] is that of pairs[i]; of what is in only one of both spans nothing is done.
+  /// Allocates nothing and never throws. A cancellation leaves the remaining results with
+  /// Status::cancelled.
+  void align_many(std::span<const CloudPair> pairs, std::span<Result> results) noexcept;
+  /// Many sources, one target.
+  void align_many(std::span<const PointsView> sources, const PreparedCloud& target,
+                  std::span<Result> results) noexcept;
+
+  /// As Registrar::prepare().
+  PreparedCloud prepare(PointsView cloud);
+
+ private:
+  std::unique_ptr<detail::BatchState> state_;
+};
+
 /// One call with the built-in model. Loads the model at its first use (thread-safe).
 VNREG_API Result align(PointsView source, PointsView target, const Options& options = {});
+/// The same for many pairs, by a BatchRegistrar.
+VNREG_API std::vector<Result> align_many(std::span<const CloudPair> pairs,
+                                         const Options& options = {});
 
 }  // namespace vnreg

@@ -27,8 +27,8 @@ class PreparedPair {
             shipped_model().data(), {.mode = Mode::verified, .threads = threads},
             static_cast<detail::Index>(std::max({source.size(), target.size(), std::size_t{64}}))) {
     detail::Cloud* cloud = workspace_.cloud;
-    detail::gather(source, 1, 0, cloud[0]);
-    detail::gather(target, 1, 0, cloud[1]);
+    detail::gather(source, 1, 0, workspace_.deadline, cloud[0]);
+    detail::gather(target, 1, 0, workspace_.deadline, cloud[1]);
     const double radius = std::max(cloud[0].rms_radius, cloud[1].rms_radius);
     if (radius > 0) scale_ = radius / shipped_model().data().arch.rms_radius;
     for (int side = 0; side < 2; ++side) detail::normalize(scale_, cloud[side]);
@@ -37,8 +37,9 @@ class PreparedPair {
   }
 
   void describe() {
-    detail::encode_descriptors(*shipped_model().data().descriptor_model, workspace_.cloud, 0,
-                               workspace_.threads, workspace_.descriptors, workspace_.recorder);
+    detail::encode_descriptors(*shipped_model().data().descriptor_model, workspace_.cloud,
+                               detail::both_sides, 0, workspace_.threads, workspace_.descriptors,
+                               workspace_.recorder);
   }
 
   bool built() const { return built_; }

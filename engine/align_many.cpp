@@ -1,0 +1,69 @@
+// Many pairs, one per thread at a time.
+#include <algorithm>
+#include <utility>
+
+#include "engine/parallel.hpp"
+#include "vnreg/vnreg.hpp"
+
+namespace vnreg {
+namespace detail {
+
+struct BatchState {
+  BatchState(const Model& model, Options options) : threads(thread_count(options.threads)) {
+    if (options.record_stages) {
+      throw Error(ErrorCode::invalid_option, "record_stages", "false in a batch", "true");
+    }
+    options.threads = 1;
+    for (int i = 0; i < threads; ++i) registrars.emplace_back(model, options);
+  }
+
+  /// results[i] = align(i, registrar) for every result.
+  template <class Align>
+  void run(std::span<Result> results, const Align& align) noexcept {
+    parallel_for(threads, static_cast<Index>(results.size()), [&](Index i, int thread) {
+      const auto pair = static_cast<std::size_t>(i);
+      results[pair] = align(pair, registrars[static_cast<std::size_t>(thread)]);
+    });
+  }
+
+  int threads;
+  std::vector<Registrar> registrars;
+};
+
+}  // namespace detail
+
+BatchRegistrar::BatchRegistrar(Model model, Options options)
+    : state_(std::make_unique<detail::BatchState>(model, options)) {}
+
+BatchRegistrar::~BatchRegistrar() = default;
+BatchRegistrar::BatchRegistrar(BatchRegistrar&&) noexcept = default;
+BatchRegistrar& BatchRegistrar::operator=(BatchRegistrar&&) noexcept = default;
+
+void BatchRegistrar::align_many(std::span<const CloudPair> pairs,
+                                std::span<Result> results) noexcept {
+  state_->run(results.first(std::min(results.size(), pairs.size())),
+              [&](std::size_t i, Registrar& registrar) -> const Result& {
+                return registrar.align(pairs[i].source, pairs[i].target);
+              });
+}
+
+void BatchRegistrar::align_many(std::span<const PointsView> sources, const PreparedCloud& target,
+                                std::span<Result> results) noexcept {
+  state_->run(results.first(std::min(results.size(), sources.size())),
+              [&](std::size_t i, Registrar& registrar) -> const Result& {
+                return registrar.align(sources[i], target);
+              });
+}
+
+PreparedCloud BatchRegistrar::prepare(PointsView cloud) {
+  return state_->registrars.front().prepare(cloud);
+}
+
+std::vector<Result> align_many(std::span<const CloudPair> pairs, const Options& options) {
+  static const Model model = Model::builtin();
+  std::vector<Result> results(pairs.size());
+  if (!pairs.empty()) BatchRegistrar(model, options).align_many(pairs, results);
+  return results;
+}
+
+}  // namespace vnreg
