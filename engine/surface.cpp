@@ -95,12 +95,32 @@ void fit_plane(Index i, Surface& s) noexcept {
   s.flat_z[own] = s.z[own] - height * normal.z();
 }
 
+/// What matches are looked up in: the records of the points and the places of their neighbours.
+void write_lookups(Surface& s) noexcept {
+  const kernels::Floats* numbers[6] = {&s.x, &s.y, &s.z, &s.normal_x, &s.normal_y, &s.normal_z};
+  for (std::size_t i = 0; i < static_cast<std::size_t>(s.count); ++i) {
+    float* record = s.records.data() + kernels::oriented_point_size * static_cast<Index>(i);
+    for (std::size_t k = 0; k < 6; ++k) record[k] = (*numbers[k])[i];
+    const std::uint16_t* neighbours =
+        s.neighbours.data() + surface_neighbours * static_cast<Index>(i);
+    float* places = s.neighbour_places.data() + 3 * neighbour_lanes * static_cast<Index>(i);
+    for (Index n = 0; n < neighbour_lanes; ++n) {
+      // The lanes behind the last neighbour repeat the first.
+      const std::size_t at = neighbours[n < surface_neighbours ? n : 0];
+      places[n] = s.x[at];
+      places[n + neighbour_lanes] = s.y[at];
+      places[n + 2 * neighbour_lanes] = s.z[at];
+    }
+  }
+}
+
 /// Moves the points into their planes.
 void flatten(Surface& s) noexcept {
   s.noise = normal_from_median * median(s.height.data(), s.count);
   std::swap(s.x, s.flat_x);
   std::swap(s.y, s.flat_y);
   std::swap(s.z, s.flat_z);
+  write_lookups(s);
   measure_extents(s.coordinates(), std::min(s.count, extent_points), s.height.data(), s.extents);
 }
 
@@ -162,7 +182,9 @@ Surface::Surface(Index max_points) : index(std::min(max_points, most_surface_poi
                                  &flat_x, &flat_y, &flat_z, &height}) {
     array->resize(points);
   }
+  records.resize(points * static_cast<std::size_t>(kernels::oriented_point_size));
   neighbours.resize(points * static_cast<std::size_t>(surface_neighbours));
+  neighbour_places.resize(points * static_cast<std::size_t>(3 * neighbour_lanes));
   grid.allocate();
 }
 

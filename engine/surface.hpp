@@ -8,6 +8,7 @@
 #include "engine/half_spaces.hpp"
 #include "kernels/nearest_grid.hpp"
 #include "kernels/neighbours.hpp"
+#include "kernels/oriented_points.hpp"
 
 namespace vnreg::detail {
 
@@ -18,6 +19,8 @@ inline constexpr Index most_surface_points = 2048;
 /// Neighbours, the point itself included, that span a point's tangent plane. Fewer follow the
 /// noise, more round off the edges.
 inline constexpr Index surface_neighbours = 14;
+/// Room for their coordinates: whole packets.
+inline constexpr Index neighbour_lanes = 16;
 
 /// Lengths are in units of the larger r.m.s. radius of the pair. The points are in progressive
 /// order: the first n of them are spread over the cloud, for any n. They lie where the points given
@@ -27,7 +30,9 @@ struct Surface {
   Index count = 0;
   kernels::Floats x, y, z;
   kernels::Floats normal_x, normal_y, normal_z;  // unit length, of either sign
+  kernels::Floats records;                       // the same, a record each (oriented_points.hpp)
   std::vector<std::uint16_t> neighbours;         // surface_neighbours per point
+  kernels::Floats neighbour_places;              // x | y | z of them, each neighbour_lanes long
   kernels::Floats spread_squared;                // squared distance to the farthest of them
   /// Distance between neighbouring points: that to the k-th neighbour over sqrt(k), median. Unlike
   /// the distance to the nearest, it is not 0 when a cloud holds every point twice.

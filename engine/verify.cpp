@@ -1,6 +1,9 @@
 #include "engine/verify.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <limits>
 
 namespace vnreg::detail {
 namespace {
@@ -19,23 +22,24 @@ constexpr float coincidence_tolerance = 0.1f;  // of the other tolerance
 // 75 % kept: recall 78 % without this factor, 82 to 83 % with 1, 0.7 and 0.5 of the tolerance.)
 constexpr float plane_tolerance = 0.7f;
 
-/// The nearest of a point's neighbours, the point itself included.
+/// The nearest of a point's neighbours, the point itself included; of those that are equally near
+/// to within 1e-6 of the squared distance, the first.
 std::uint16_t step(const Surface& s, std::uint16_t from, float x, float y, float z) noexcept {
-  const std::uint16_t* neighbours =
-      s.neighbours.data() + surface_neighbours * static_cast<Index>(from);
-  float squared[surface_neighbours];
-#pragma omp simd
-  for (Index n = 0; n < surface_neighbours; ++n) {
-    const std::size_t at = neighbours[n];
-    const float dx = s.x[at] - x, dy = s.y[at] - y, dz = s.z[at] - z;
-    squared[n] = dx * dx + dy * dy + dz * dz;
+  const float* px = s.neighbour_places.data() + 3 * neighbour_lanes * Index{from};
+  const float* py = px + neighbour_lanes;
+  const float* pz = py + neighbour_lanes;
+  // The lane takes the last bits of the distance: numbers from 0 on are ordered like their bits.
+  constexpr std::int32_t lane_bits = neighbour_lanes - 1;
+  std::int32_t least = std::numeric_limits<std::int32_t>::max();
+#pragma omp simd reduction(min : least)
+  for (std::int32_t n = 0; n < neighbour_lanes; ++n) {
+    const float dx = px[n] - x, dy = py[n] - y, dz = pz[n] - z;
+    const auto bits = std::bit_cast<std::int32_t>(dx * dx + dy * dy + dz * dz);
+    const std::int32_t key = (bits & ~lane_bits) | n;
+    least = key < least ? key : least;
   }
-  return neighbours[std::min_element(squared, squared + surface_neighbours) - squared];
-}
-
-std::uint16_t nearest(const Surface& s, Search search, float x, float y, float z) noexcept {
-  const std::uint16_t at = s.grid.nearest(x, y, z);
-  return search == Search::cell ? at : step(s, at, x, y, z);
+  return s
+      .neighbours[static_cast<std::size_t>(surface_neighbours * Index{from} + (least & lane_bits))];
 }
 
 void move(const Motion& m, const Surface& s, Index first, Matches& out) noexcept {
@@ -50,6 +54,20 @@ void move(const Motion& m, const Surface& s, Index first, Matches& out) noexcept
     out.y[i] = r[3] * x[i] + r[4] * y[i] + r[5] * z[i] + t[1];
     out.z[i] = r[6] * x[i] + r[7] * y[i] + r[8] * z[i] + t[2];
   }
+}
+
+/// Sets the nearest points, and their normals, of the moved ones.
+void find_nearest(const Surface& fixed, Search search, Matches& out) noexcept {
+  std::uint16_t places[Matches::capacity];
+  fixed.grid.nearest({out.x, out.y, out.z}, out.count, places);
+  if (search == Search::exact) {
+    for (Index i = 0; i < out.count; ++i) {
+      places[i] = step(fixed, places[i], out.x[i], out.y[i], out.z[i]);
+    }
+  }
+  kernels::gather_points(
+      fixed.records.data(), places, out.count,
+      {out.nearest_x, out.nearest_y, out.nearest_z, out.normal_x, out.normal_y, out.normal_z});
 }
 
 void compare(const Motion& m, const Surface& s, Index first, Matches& out) noexcept {
@@ -71,11 +89,12 @@ void compare(const Motion& m, const Surface& s, Index first, Matches& out) noexc
   }
 }
 
+using Numbers = Eigen::Map<const Eigen::ArrayXf, Eigen::Aligned64>;
+
 /// Biweight: from 1 at 0 to 0 at 1 and beyond.
-inline float kernel(float squared) noexcept {
-  const float inside = 1 - squared;
-  const float positive = inside > 0 ? inside : 0;
-  return positive * positive;
+template <class Squared>
+auto kernel(const Squared& squared) noexcept {
+  return (1 - squared).max(0.0f).square();
 }
 
 /// Moved points without a match.
@@ -98,17 +117,26 @@ float sum_of_agreement(const Matches& m, float tolerance) noexcept {
   const float per_limit = 1 / (9 * tolerance * tolerance);
   const float per_coincidence = per_limit / (coincidence_tolerance * coincidence_tolerance);
   const float per_plane = 1 / (plane_tolerance * plane_tolerance * tolerance * tolerance);
-  float sum = 0;
-#pragma omp simd reduction(+ : sum)
-  for (Index i = 0; i < m.count; ++i) {
-    const float height = (m.x[i] - m.nearest_x[i]) * m.normal_x[i] +
-                         (m.y[i] - m.nearest_y[i]) * m.normal_y[i] +
-                         (m.z[i] - m.nearest_z[i]) * m.normal_z[i];
-    const float near = kernel(m.squared[i] * per_limit) * kernel(height * height * per_plane);
-    const float coincident = kernel(m.squared[i] * per_coincidence);
-    sum += ((1 - coincidence_share) * near + coincidence_share * coincident) * m.agreement[i];
-  }
-  return sum;
+  const auto of = [&](const float* numbers) { return Numbers(numbers, m.count); };
+  const auto height = (of(m.x) - of(m.nearest_x)) * of(m.normal_x) +
+                      (of(m.y) - of(m.nearest_y)) * of(m.normal_y) +
+                      (of(m.z) - of(m.nearest_z)) * of(m.normal_z);
+  const auto near = kernel(of(m.squared) * per_limit) * kernel(height.square() * per_plane);
+  const auto coincident = kernel(of(m.squared) * per_coincidence);
+  return (((1 - coincidence_share) * near + coincidence_share * coincident) * of(m.agreement))
+      .sum();
+}
+
+/// Sum of 1 - squared distance / tolerance^2, no less than 0, over source points.
+float sum_of_nearness(const Motion& motion, const Surface surface[2], Index first, Index count,
+                      float tolerance, Matches& m) noexcept {
+  m.count = count;
+  move(motion, surface[0], first, m);
+  find_nearest(surface[1], Search::cell, m);
+  const auto of = [&](const float* numbers) { return Numbers(numbers, count); };
+  const auto squared = (of(m.x) - of(m.nearest_x)).square() + (of(m.y) - of(m.nearest_y)).square() +
+                       (of(m.z) - of(m.nearest_z)).square();
+  return (1 - squared * (1 / (tolerance * tolerance))).max(0.0f).sum();
 }
 
 /// Of the first points of `moving`.
@@ -140,15 +168,7 @@ void match_points(const Motion& motion, const Surface& moving, Index first, Inde
                   const Surface& fixed, Search search, Matches& out) noexcept {
   out.count = count;
   move(motion, moving, first, out);
-  for (Index i = 0; i < count; ++i) {
-    const std::size_t at = nearest(fixed, search, out.x[i], out.y[i], out.z[i]);
-    out.nearest_x[i] = fixed.x[at];
-    out.nearest_y[i] = fixed.y[at];
-    out.nearest_z[i] = fixed.z[at];
-    out.normal_x[i] = fixed.normal_x[at];
-    out.normal_y[i] = fixed.normal_y[at];
-    out.normal_z[i] = fixed.normal_z[at];
-  }
+  find_nearest(fixed, search, out);
   compare(motion, moving, first, out);
 }
 
@@ -161,25 +181,13 @@ Fit two_sided_fit(const Motion& motion, const Surface surface[2], Index points, 
 }
 
 float probe(const Motion& motion, const Surface surface[2], float tolerance) noexcept {
-  const Surface& source = surface[0];
-  const Surface& target = surface[1];
-  const float* r = motion.rotation;
-  const float* t = motion.translation;
-  const float per_limit = 1 / (tolerance * tolerance);
-  const auto total = static_cast<std::size_t>(std::min(probe_points, source.count));
-  float sum = 0;
-  for (std::size_t i = 0; i < total; ++i) {
-    const float px = source.x[i], py = source.y[i], pz = source.z[i];
-    const float x = r[0] * px + r[1] * py + r[2] * pz + t[0];
-    const float y = r[3] * px + r[4] * py + r[5] * pz + t[1];
-    const float z = r[6] * px + r[7] * py + r[8] * pz + t[2];
-    const std::size_t at = target.grid.nearest(x, y, z);
-    const float dx = x - target.x[at], dy = y - target.y[at], dz = z - target.z[at];
-    const float inside = 1 - (dx * dx + dy * dy + dz * dz) * per_limit;
-    sum += inside > 0 ? inside : 0;
-    if (i + 1 == static_cast<std::size_t>(first_probes) && sum < first_probes_least) return 0;
-  }
-  return sum;
+  static_assert(probe_points <= Matches::capacity);
+  const Index total = std::min(probe_points, surface[0].count);
+  const Index first = std::min(first_probes, total);
+  Matches matches;
+  const float sum = sum_of_nearness(motion, surface, 0, first, tolerance, matches);
+  if (sum < first_probes_least) return 0;
+  return sum + sum_of_nearness(motion, surface, first, total - first, tolerance, matches);
 }
 
 }  // namespace vnreg::detail

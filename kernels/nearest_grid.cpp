@@ -86,6 +86,8 @@ void NearestGrid::place(const SpatialIndex& index, float margin, float reach) no
     counts_[axis] = std::min(whole_blocks, cells);
     last_[axis] = static_cast<float>(counts_[axis] - 1);
   }
+  columns_ = static_cast<std::int32_t>(counts_[0]);
+  rows_ = static_cast<std::int32_t>(counts_[1]);
   reach_ = reach;
 }
 
@@ -133,6 +135,21 @@ void NearestGrid::fill(const SpatialIndex& index, Index first, Index last,
       const Index z = corner[2] + i / (block * block);
       nearest_[static_cast<std::size_t>((z * counts_[1] + y) * counts_[0] + x)] =
           static_cast<std::uint16_t>(original[block_of_cells.place[i]]);
+    }
+  }
+}
+
+void NearestGrid::nearest(const Coordinates& queries, Index count,
+                          std::uint16_t* places) const noexcept {
+  constexpr Index most = 64;
+  alignas(64) std::int32_t cell[most];
+  for (Index first = 0; first < count; first += most) {
+    const Index some = std::min(most, count - first);
+    const float *x = queries.x + first, *y = queries.y + first, *z = queries.z + first;
+#pragma omp simd
+    for (Index i = 0; i < some; ++i) cell[i] = cell_of(x[i], y[i], z[i]);
+    for (Index i = 0; i < some; ++i) {
+      places[first + i] = nearest_[static_cast<std::size_t>(cell[i])];
     }
   }
 }

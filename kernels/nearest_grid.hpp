@@ -39,23 +39,26 @@ class NearestGrid {
 
   /// A place in the input of the index. Outside of the box: that of the cell of the box nearest by.
   std::uint16_t nearest(float x, float y, float z) const noexcept {
-    const Index cell =
-        (place_along(2, z) * counts_[1] + place_along(1, y)) * counts_[0] + place_along(0, x);
-    return nearest_[static_cast<std::size_t>(cell)];
+    return nearest_[static_cast<std::size_t>(cell_of(x, y, z))];
   }
+  /// The same for `count` queries.
+  void nearest(const Coordinates& queries, Index count, std::uint16_t* places) const noexcept;
 
  private:
-  Index place_along(int axis, float value) const noexcept {
+  std::int32_t cell_of(float x, float y, float z) const noexcept {
+    return (place_along(2, z) * rows_ + place_along(1, y)) * columns_ + place_along(0, x);
+  }
+  std::int32_t place_along(int axis, float value) const noexcept {
     const float place = (value - low_[axis]) * per_size_;
     // In this order NaN gives 0.
     const float raised = place > 0.0f ? place : 0.0f;
-    return static_cast<Index>(
-        static_cast<std::int32_t>(raised < last_[axis] ? raised : last_[axis]));
+    return static_cast<std::int32_t>(raised < last_[axis] ? raised : last_[axis]);
   }
 
   float low_[3] = {0, 0, 0};
   float last_[3] = {0, 0, 0};  // cells along the axis, less one
   Index counts_[3] = {0, 0, 0};
+  std::int32_t columns_ = 0, rows_ = 0;  // cells along x and y
   float size_ = 1;
   float per_size_ = 1;
   float reach_ = 0;

@@ -61,6 +61,7 @@ class Filled {
   }
 
   std::size_t nearest(const Point& q) const { return grid_.nearest(q[0], q[1], q[2]); }
+  const NearestGrid& grid() const { return grid_; }
   double found_distance(const Point& q) const { return distance(q, points_.at(nearest(q))); }
   double nearest_distance(const Point& q) const {
     double nearest = std::numeric_limits<double>::infinity();
@@ -120,6 +121,29 @@ TEST_CASE("blocks may be filled in any portions") {
       CAPTURE(chunk, q[0], q[1], q[2]);
       REQUIRE(portions.nearest(q) == whole.nearest(q));
     }
+  }
+}
+
+TEST_CASE("many queries are answered like one at a time") {
+  Random random(94);
+  const std::vector<Point> points = make_points(Kind::gaussian, 333, random);
+  const Filled filled(points, 0.3f, 0.5f, 1000);
+  for (const Index count : {0, 1, 7, 63, 64, 65, 200}) {
+    std::vector<float> axes[3];
+    for (Index i = 0; i < count; ++i) {
+      Point q = filled.random_query(random);
+      if (i % 5 == 4) q[static_cast<std::size_t>(i % 3)] *= 100;  // outside of the box
+      for (std::size_t axis = 0; axis < 3; ++axis) axes[axis].push_back(q[axis]);
+    }
+    constexpr std::uint16_t sentinel = 65535;
+    std::vector<std::uint16_t> found(static_cast<std::size_t>(count) + 16, sentinel);
+    filled.grid().nearest({axes[0].data(), axes[1].data(), axes[2].data()}, count, found.data());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      CAPTURE(count, i);
+      REQUIRE(found[i] == filled.nearest({axes[0][i], axes[1][i], axes[2][i]}));
+    }
+    REQUIRE(std::all_of(found.begin() + count, found.end(),
+                        [](std::uint16_t v) { return v == sentinel; }));
   }
 }
 
