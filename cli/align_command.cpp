@@ -67,6 +67,8 @@ void refuse_if_all_equal(const NamedCloud& cloud) {
       case Status::ok:
       case Status::low_confidence:
       case Status::ambiguous:
+      case Status::timed_out:
+      case Status::cancelled:
         break;
     }
   }

@@ -21,6 +21,7 @@ ExitCode exit_code(ErrorCode code) {
     case ErrorCode::corrupt_model:
     case ErrorCode::wrong_architecture:
     case ErrorCode::missing_tensor:
+    case ErrorCode::invalid_points:
       break;
   }
   return ExitCode::input;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/options.hpp"
 #include "engine/parallel.hpp"
 #include "vnreg/vnreg.hpp"
 
@@ -9,7 +10,9 @@ namespace vnreg {
 namespace detail {
 
 struct BatchState {
-  BatchState(const Model& model, Options options) : threads(thread_count(options.threads)) {
+  BatchState(const Model& model, Options options) {
+    check_threads(options.threads);
+    threads = thread_count(options.threads);
     if (options.record_stages) {
       throw Error(ErrorCode::invalid_option, "record_stages", "false in a batch", "true");
     }
@@ -26,7 +29,7 @@ struct BatchState {
     });
   }
 
-  int threads;
+  int threads = 1;
   std::vector<Registrar> registrars;
 };
 

@@ -39,4 +39,28 @@ std::string_view to_string(Status status) noexcept {
   return "unknown";
 }
 
+std::string_view to_string(ErrorCode code) noexcept {
+  switch (code) {
+    case ErrorCode::file_unreadable:
+      return "file_unreadable";
+    case ErrorCode::not_a_model:
+      return "not_a_model";
+    case ErrorCode::unsupported_version:
+      return "unsupported_version";
+    case ErrorCode::corrupt_model:
+      return "corrupt_model";
+    case ErrorCode::wrong_architecture:
+      return "wrong_architecture";
+    case ErrorCode::missing_tensor:
+      return "missing_tensor";
+    case ErrorCode::invalid_option:
+      return "invalid_option";
+    case ErrorCode::unsupported_cpu:
+      return "unsupported_cpu";
+    case ErrorCode::invalid_points:
+      return "invalid_points";
+  }
+  return "unknown";
+}
+
 }  // namespace vnreg

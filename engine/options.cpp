@@ -33,9 +33,11 @@ void check_range(const char* field, int value, int min, int max) {
 
 }  // namespace
 
+void check_threads(int threads) { check_range("threads", threads, 1, 1024); }
+
 Index checked_max_points(const ModelData& model, const Options& options) {
   check_mode(model, options.mode);
-  check_range("threads", options.threads, 1, 1024);
+  check_threads(options.threads);
   const int fewest = std::max(64, static_cast<int>(model.arch.min_points()));
   check_range("max_points", options.max_points, fewest, 16384);
   if (!(options.time_budget_ms >= 0 && options.time_budget_ms <= longest_budget_ms)) {

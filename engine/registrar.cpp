@@ -95,7 +95,8 @@ Status take(const ModelData& model, const Options& options, const Input& input, 
   if (input.prepared == nullptr) {
     return gather(input.points, model.arch.min_points(), options.seed, w.deadline, cloud);
   }
-  cloud = input.prepared->cloud;
+  cloud.count = input.prepared->cloud.count;
+  if (input.prepared->status == Status::ok) cloud = input.prepared->cloud;
   return input.prepared->status;
 }
 
@@ -267,7 +268,8 @@ Status run_alone(const ModelData& model, const Options& options, const PointsVie
 
 Input RegistrarState::input(const PreparedCloud& cloud) const noexcept {
   const PreparedData& prepared = cloud.data();
-  const bool serves = prepared.serves(model.data(), options, max_points);
+  const bool serves =
+      prepared.status != Status::ok || prepared.serves(model.data(), options, max_points);
   return {prepared.points(), serves ? &prepared : nullptr};
 }
 

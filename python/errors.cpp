@@ -1,6 +1,7 @@
 #include "python/errors.hpp"
 
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/string_view.h>
 
 #include <exception>
 #include <string>
@@ -12,31 +13,9 @@ namespace nb = nanobind;
 namespace vnreg::python {
 namespace {
 
-const char* name_of(ErrorCode code) noexcept {
-  switch (code) {
-    case ErrorCode::file_unreadable:
-      return "file_unreadable";
-    case ErrorCode::not_a_model:
-      return "not_a_model";
-    case ErrorCode::unsupported_version:
-      return "unsupported_version";
-    case ErrorCode::corrupt_model:
-      return "corrupt_model";
-    case ErrorCode::wrong_architecture:
-      return "wrong_architecture";
-    case ErrorCode::missing_tensor:
-      return "missing_tensor";
-    case ErrorCode::invalid_option:
-      return "invalid_option";
-    case ErrorCode::unsupported_cpu:
-      return "unsupported_cpu";
-  }
-  return "unknown";
-}
-
 void raise(const Error& error, nb::handle type) {
   nb::object instance = type(error.what());
-  instance.attr("code") = name_of(error.code());
+  instance.attr("code") = to_string(error.code());
   instance.attr("field") = error.field();
   instance.attr("expected") = error.expected();
   instance.attr("got") = error.got();

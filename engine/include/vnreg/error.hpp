@@ -22,6 +22,9 @@ enum class ErrorCode {
   invalid_points,       // a cloud's layout cannot be read
 };
 
+/// The code's name as it is written here.
+VNREG_API std::string_view to_string(ErrorCode code) noexcept;
+
 /// A failure with everything needed to act on it: what is wrong, where, and both values.
 class VNREG_API Error : public std::runtime_error {
  public:

@@ -229,7 +229,7 @@ class VNREG_API Model {
 /// mode than that which made it take its points as if they had been given.
 class VNREG_API PreparedCloud {
  public:
-  /// Status::ok, or why no pose can be found with it: too_few_points, not_finite, degenerate;
+  /// Status::ok, or why no registrar finds a pose with it: too_few_points, not_finite, degenerate;
   /// timed_out or cancelled when its registrar's limits were met.
   Status status() const noexcept;
   /// Points used, after subsampling.

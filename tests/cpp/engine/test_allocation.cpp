@@ -133,5 +133,32 @@ TEST_CASE("mode verified allocates nothing, with the shipped model") {
   }
 }
 
+TEST_CASE("prepared clouds, batches and budgets allocate nothing while they align") {
+  Random random(84);
+  const Points source = shape(1000, random), many = shape(5000, random), few = shape(24, random);
+  const Points target = moved(shape(900, random), random_motion(random, 1));
+  const Model model = Model::builtin();
+  Registrar registrar(model, {.threads = 2});
+  Registrar limited(model, {.threads = 2, .time_budget_ms = 3});
+  BatchRegistrar batch(model, {.threads = 2});
+  const PreparedCloud prepared[] = {registrar.prepare(target), registrar.prepare(many),
+                                    registrar.prepare(few), registrar.prepare(Points{})};
+  const CloudPair pairs[] = {{source, target}, {many, few}, {few, source}};
+  const PointsView views[] = {source, few, many};
+  Result results[3];
+  batch.align_many(pairs, results);  // the threads are made
+  const long before = allocations;
+  for (const PreparedCloud& cloud : prepared) {
+    registrar.align(source, cloud);
+    registrar.align(cloud, prepared[0]);
+    limited.align(cloud, few);
+    batch.align_many(views, cloud, results);
+  }
+  batch.align_many(pairs, results);
+  const long after = allocations;
+  REQUIRE(after == before);
+  for (const Result& result : results) REQUIRE(result.has_pose);
+}
+
 }  // namespace
 }  // namespace vnreg::test

@@ -102,6 +102,8 @@ TEST_CASE("the words of the API") {
   REQUIRE(to_string(Status::not_finite) == "not_finite");
   REQUIRE(to_string(Status::degenerate) == "degenerate");
   REQUIRE(to_string(Status::ambiguous) == "ambiguous");
+  REQUIRE(to_string(Status::timed_out) == "timed_out");
+  REQUIRE(to_string(Status::cancelled) == "cancelled");
   REQUIRE(to_string(static_cast<Status>(99)) == "unknown");
   REQUIRE(to_string(static_cast<Mode>(99)) == "unknown");
   REQUIRE(version() == VNREG_EXPECTED_VERSION);
