@@ -14,7 +14,7 @@ PEERS_DEBIAN := libusb-1.0-0 libgl1 libegl1 libidn2-0
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python check sanitize \
-        bench evaluate train train-paper data model clean
+        bench bench-compare evaluate train train-paper data model clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -86,9 +86,19 @@ evaluate: python data $(VENV)/.peers ## all modes and peers on the test split, i
 	$(PY) -m vnreg_train.cli evaluate --methods modes peers --run runs/evaluate --jobs 2
 	$(PY) -m vnreg_train.cli report --run runs/evaluate
 
-bench: python build ## milliseconds per pair, kernels and engine beside torch
-	build/$(PRESET)/kernels_bench --benchmark_min_time=0.2
-	$(PY) bench/versus_torch.py
+$(VENV)/.bench: requirements/bench.txt $(VENV)/.peers
+	$(PY) -m pip install -q -r requirements/bench.txt
+	touch $@
+
+# Figures mean something where nothing else runs: see docs/benchmark.md, "How each part was measured".
+BENCH := PYTHONPATH=bench $(PY) -m vnreg_bench
+bench: python build $(VENV)/.bench ## times of kernels, engine, peers, runtimes, into docs/benchmark.md; BENCH_ARGS=--quick: minutes
+	$(PY) -m vnreg_train.cli build-data --splits validation --no-occupancy
+	$(BENCH) run --build build/$(PRESET) $(BENCH_ARGS)
+
+bench-compare: python ## this tree's benchmarks beside those of BASE=<commit>; fails where one is slower
+	@test -n "$(BASE)" || { echo "usage: make bench-compare BASE=<commit>"; exit 2; }
+	$(BENCH) compare $(BASE)
 
 clean:
 	rm -rf build

@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   benchmark::AddCustomContext("vnreg", std::string(vnreg::version()));
   benchmark::AddCustomContext("compiler", VNREG_COMPILER ", " VNREG_BUILD_TYPE);
   benchmark::AddCustomContext("instruction set", std::string(vnreg::instruction_set()));
-  vnreg::bench::add_roofline_context();
+  vnreg::bench::register_roofline();
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
 }

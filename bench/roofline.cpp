@@ -37,32 +37,41 @@ double best_seconds(const Run& run) {
   return best;
 }
 
-double measure_product() {
-  constexpr Eigen::Index size = 768;
-  const Eigen::MatrixXf a = Eigen::MatrixXf::Random(size, size);
-  const Eigen::MatrixXf b = Eigen::MatrixXf::Random(size, size);
-  Eigen::MatrixXf c(size, size);
-  const double seconds = best_seconds([&] {
-    c.noalias() = a * b;
+class Product {
+ public:
+  void run() {
+    c_.noalias() = a_ * b_;
     benchmark::ClobberMemory();
-  });
-  return 1e-9 * 2 * static_cast<double>(size * size * size) / seconds;
-}
+  }
+  static double flops() { return 2 * static_cast<double>(size * size * size); }
 
-double measure_triad(double bytes) {
-  const auto size = static_cast<Eigen::Index>(bytes / (3 * sizeof(float)));
-  Eigen::ArrayXf a = Eigen::ArrayXf::Zero(size);
-  const Eigen::ArrayXf b = Eigen::ArrayXf::Random(size), c = Eigen::ArrayXf::Random(size);
-  // Short sets are repeated until a run takes about a millisecond.
-  const int repeats = std::max(1, static_cast<int>(50e6 / bytes));
-  const double seconds = best_seconds([&] {
-    for (int i = 0; i < repeats; ++i) {
-      a = b + 0.5f * c;
+ private:
+  static constexpr Eigen::Index size = 768;
+  Eigen::MatrixXf a_ = Eigen::MatrixXf::Random(size, size);
+  Eigen::MatrixXf b_ = Eigen::MatrixXf::Random(size, size);
+  Eigen::MatrixXf c_ = Eigen::MatrixXf::Zero(size, size);
+};
+
+/// a = b + s c over `bytes`; short sets repeatedly, until a run takes about a millisecond.
+class Triad {
+ public:
+  explicit Triad(double bytes)
+      : repeats_(std::max(1, static_cast<int>(50e6 / bytes))),
+        a_(Eigen::ArrayXf::Zero(static_cast<Eigen::Index>(bytes / (3 * sizeof(float))))),
+        b_(Eigen::ArrayXf::Random(a_.size())),
+        c_(Eigen::ArrayXf::Random(a_.size())) {}
+  void run() {
+    for (int i = 0; i < repeats_; ++i) {
+      a_ = b_ + 0.5f * c_;
       benchmark::ClobberMemory();
     }
-  });
-  return 1e-9 * 3 * sizeof(float) * static_cast<double>(size) * repeats / seconds;
-}
+  }
+  double bytes() const { return 3 * sizeof(float) * static_cast<double>(a_.size()) * repeats_; }
+
+ private:
+  int repeats_;
+  Eigen::ArrayXf a_, b_, c_;
+};
 
 Level level_of(double bytes) {
   const auto* above = std::find_if(std::begin(level_bytes), std::end(level_bytes),
@@ -74,13 +83,35 @@ benchmark::Counter rate(double per_iteration) {
   return {per_iteration, benchmark::Counter::kIsIterationInvariantRate};
 }
 
+void product_again(benchmark::State& state) {
+  Product product;
+  for (auto _ : state) product.run();
+  state.counters["GFLOP/s"] = rate(1e-9 * Product::flops());
+  state.counters["GB/s"] = rate(0);
+  state.counters["share"] = rate(1e-9 * Product::flops() / roofline().gflops);
+  state.SetLabel("product");
+}
+
+void triad_again(benchmark::State& state, int level) {
+  Triad triad(triad_bytes[level]);
+  for (auto _ : state) triad.run();
+  state.counters["GFLOP/s"] = rate(0);
+  state.counters["GB/s"] = rate(1e-9 * triad.bytes());
+  state.counters["share"] = rate(1e-9 * triad.bytes() / roofline().gigabytes_per_s[level]);
+  state.SetLabel(level_names[level]);
+}
+
 }  // namespace
 
 const Roofline& roofline() {
   static const Roofline measured = [] {
     Roofline r{};
-    r.gflops = measure_product();
-    for (int i = 0; i < 4; ++i) r.gigabytes_per_s[i] = measure_triad(triad_bytes[i]);
+    Product product;
+    r.gflops = 1e-9 * Product::flops() / best_seconds([&] { product.run(); });
+    for (int i = 0; i < 4; ++i) {
+      Triad triad(triad_bytes[i]);
+      r.gigabytes_per_s[i] = 1e-9 * triad.bytes() / best_seconds([&] { triad.run(); });
+    }
     return r;
   }();
   return measured;
@@ -97,12 +128,17 @@ void count(benchmark::State& state, const Work& work) {
   state.SetLabel(compute_s >= transfer_s ? "product" : level_names[static_cast<int>(level)]);
 }
 
-void add_roofline_context() {
+void register_roofline() {
   const Roofline& roof = roofline();
   benchmark::AddCustomContext("roof product GFLOP/s", std::to_string(roof.gflops));
   for (int i = 0; i < 4; ++i) {
     benchmark::AddCustomContext(std::string("roof triad ") + level_names[i] + " GB/s",
                                 std::to_string(roof.gigabytes_per_s[i]));
+  }
+  benchmark::RegisterBenchmark("roof/product", product_again);
+  for (int i = 0; i < 4; ++i) {
+    const std::string name = std::string("roof/") + level_names[i];
+    benchmark::RegisterBenchmark(name.c_str(), triad_again, i);
   }
 }
 

@@ -28,7 +28,8 @@ struct Work {
 /// over the time taken. The label names what bounds it.
 void count(benchmark::State& state, const Work& work);
 
-/// Tells the roofline in the report's context.
-void add_roofline_context();
+/// Tells the roofline in the report's context, and registers it as benchmarks: run among the
+/// others, they tell whether the processor still does what it did at the start.
+void register_roofline();
 
 }  // namespace vnreg::bench

@@ -1,0 +1,58 @@
+"""How times are taken and summed up."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+WARM_UP = 3
+TAIL = {"p50": 0.5, "p95": 0.95, "p99": 0.99, "p99.9": 0.999}
+Times = list[float]
+
+
+def milliseconds(run: Callable[[], object]) -> float:
+    """Wall time of one call."""
+    started = time.perf_counter()
+    run()
+    return 1e3 * (time.perf_counter() - started)
+
+
+def interleaved(work: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, Times]:
+    """What every function returns (its milliseconds), `rounds` times: each round calls each once,
+    so that whatever else the machine does meets all alike. The first rounds are left out."""
+    times: dict[str, Times] = {label: [] for label in work}
+    for round_number in range(-WARM_UP, rounds):
+        for label, run in work.items():
+            ms = run()
+            if round_number >= 0:
+                times[label].append(ms)
+    return times
+
+
+def summary(times: Sequence[float]) -> dict[str, float]:
+    """Median, quartiles, shortest, and how many; for the JSON."""
+    first, median, third = np.quantile(times, [0.25, 0.5, 0.75])
+    return {
+        "median": float(median),
+        "q1": float(first),
+        "q3": float(third),
+        "min": float(np.min(times)),
+        "runs": len(times),
+    }
+
+
+def tail(times: Sequence[float]) -> dict[str, float]:
+    """Quantiles of a latency: the smallest time that so large a share does not exceed."""
+    values = np.quantile(times, list(TAIL.values()), method="inverted_cdf")
+    return dict(zip(TAIL, (float(v) for v in values), strict=True)) | {"runs": len(times)}
+
+
+def histogram(times: Sequence[float], bins: int = 80) -> dict[str, list[float]]:
+    """Counts in bins of equal ratio between shortest and longest time."""
+    low, high = min(times), max(times)
+    edges = np.geomspace(low, max(high, low * 1.001), bins + 1)
+    edges[0], edges[-1] = low, max(high, edges[-1])
+    counts, _ = np.histogram(times, edges)
+    return {"edges": [float(e) for e in edges], "counts": [int(c) for c in counts]}
