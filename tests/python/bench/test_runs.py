@@ -1,0 +1,78 @@
+"""Tiny real runs of the parts that need no built program."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from vnreg_bench import engine_times, low_precision
+from vnreg_bench.inputs import SHIPPED, bent_box, random_paper_model
+from vnreg_bench.settings import Settings
+
+from vnreg_train.model_file import read_model
+
+TINY = Settings(
+    rounds=2, sizes=(128, 256), channels=(8, 16), threads=(1,), contest_networks=("vnreg",)
+)
+
+
+@pytest.fixture(autouse=True)
+def processors() -> Iterator[None]:
+    """Parts pin their process: here it is the tests'."""
+    allowed = os.sched_getaffinity(0)
+    yield
+    os.sched_setaffinity(0, allowed)
+
+
+def test_time_against_points_has_every_mode_and_size() -> None:
+    found = engine_times.time_against_points(TINY)
+    expected = {f"{mode}/{n}" for mode in engine_times.MODES for n in TINY.sizes}
+    assert set(found["times"]) == set(found["stages"]) == expected
+    for key, times in found["times"].items():
+        assert times["runs"] == TINY.rounds
+        stages = found["stages"][key]
+        assert 0 < stages["encode"] < stages["total"]
+        assert times["median"] > 0.3 * stages["total"]
+
+
+def test_time_grows_with_the_channels() -> None:
+    found = engine_times.time_against_channels(replace(TINY, channels=(8, 64)))
+    assert found["encode"]["64"] > 3 * found["encode"]["8"]
+
+
+def test_bent_boxes_are_samples_of_one_surface_turned() -> None:
+    source, target = bent_box(500)
+    assert source.shape == target.shape == (500, 3)
+    assert source.dtype == np.float32
+    assert not np.isin(source, target).any()
+    spread = [np.sort(np.linalg.svd(c - c.mean(0), compute_uv=False)) for c in (source, target)]
+    np.testing.assert_allclose(spread[0], spread[1], rtol=0.1)
+
+
+def test_random_models_have_the_width_asked_for(tmp_path: Path) -> None:
+    random_paper_model(tmp_path / "m.vnr", 24, points=256)
+    metadata, tensors = read_model(tmp_path / "m.vnr")
+    assert metadata["channels.global"] == 24
+    assert metadata["channels.local"] == 12
+    assert tensors["encoder.pre"].shape == (48, 3)
+
+
+def test_rounded_weights_are_those_of_bfloat16(tmp_path: Path) -> None:
+    low_precision.round_weights(SHIPPED["vnreg"], tmp_path / "rounded.vnr")
+    (metadata, tensors), (_, before) = (
+        read_model(tmp_path / "rounded.vnr"),
+        read_model(SHIPPED["vnreg"]),
+    )
+    assert metadata["name"] == "vnreg"
+    changed = 0
+    for name, values in tensors.items():
+        rounded = torch.from_numpy(np.array(values))
+        assert torch.equal(rounded.bfloat16().float(), rounded)
+        np.testing.assert_allclose(values, before[name], rtol=2**-8)
+        changed += int((values != before[name]).sum())
+    assert changed > 60_000
