@@ -20,15 +20,6 @@ struct BatchState {
     for (int i = 0; i < threads; ++i) registrars.emplace_back(model, options);
   }
 
-  /// results[i] = align(i, registrar) for every result.
-  template <class Align>
-  void run(std::span<Result> results, const Align& align) noexcept {
-    parallel_for(threads, static_cast<Index>(results.size()), [&](Index i, int thread) {
-      const auto pair = static_cast<std::size_t>(i);
-      results[pair] = align(pair, registrars[static_cast<std::size_t>(thread)]);
-    });
-  }
-
   int threads = 1;
   std::vector<Registrar> registrars;
 };
@@ -44,18 +35,13 @@ BatchRegistrar& BatchRegistrar::operator=(BatchRegistrar&&) noexcept = default;
 
 void BatchRegistrar::align_many(std::span<const CloudPair> pairs,
                                 std::span<Result> results) noexcept {
-  state_->run(results.first(std::min(results.size(), pairs.size())),
-              [&](std::size_t i, Registrar& registrar) -> const Result& {
-                return registrar.align(pairs[i].source, pairs[i].target);
-              });
-}
-
-void BatchRegistrar::align_many(std::span<const PointsView> sources, const PreparedCloud& target,
-                                std::span<Result> results) noexcept {
-  state_->run(results.first(std::min(results.size(), sources.size())),
-              [&](std::size_t i, Registrar& registrar) -> const Result& {
-                return registrar.align(sources[i], target);
-              });
+  detail::BatchState& s = *state_;
+  const std::size_t count = std::min(pairs.size(), results.size());
+  detail::parallel_for(s.threads, static_cast<detail::Index>(count), [&](auto index, int thread) {
+    const auto i = static_cast<std::size_t>(index);
+    Registrar& registrar = s.registrars[static_cast<std::size_t>(thread)];
+    results[i] = registrar.align(pairs[i].source, pairs[i].target);
+  });
 }
 
 PreparedCloud BatchRegistrar::prepare(PointsView cloud) {

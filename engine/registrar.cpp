@@ -28,19 +28,18 @@ namespace detail {
 
 using kernels::RigidTransform;
 
-/// A cloud as it comes in.
+/// A cloud as it comes in. What another kind of registrar has prepared counts as points.
 struct Input {
   PointsView points;
-  const PreparedData* prepared = nullptr;  // if not null, `points` are its points
+  const PreparedData* prepared;  // if not null, that counts
 };
 
 struct RegistrarState {
   RegistrarState(Model m, const Options& o, Index points)
       : model(std::move(m)), options(o), max_points(points), workspace(model.data(), o, points) {}
 
-  /// What another kind of registrar has prepared counts as points.
-  Input input(const PreparedCloud& cloud) const noexcept;
-  const Result& align(const Input& source, const Input& target) noexcept;
+  Input input(const CloudRef& cloud) const noexcept;
+  const Result& align(const CloudRef& source, const CloudRef& target) noexcept;
   std::shared_ptr<const PreparedData> prepare(const PointsView& points);
 
   Model model;
@@ -266,19 +265,20 @@ Status run_alone(const ModelData& model, const Options& options, const PointsVie
 
 }  // namespace
 
-Input RegistrarState::input(const PreparedCloud& cloud) const noexcept {
-  const PreparedData& prepared = cloud.data();
-  const bool serves =
-      prepared.status != Status::ok || prepared.serves(model.data(), options, max_points);
-  return {prepared.points(), serves ? &prepared : nullptr};
+Input RegistrarState::input(const CloudRef& cloud) const noexcept {
+  const PreparedData* prepared = cloud.prepared();
+  if (prepared == nullptr) return {cloud.points(), nullptr};
+  const bool usable =
+      prepared->status != Status::ok || prepared->serves(model.data(), options, max_points);
+  return {prepared->points(), usable ? prepared : nullptr};
 }
 
-const Result& RegistrarState::align(const Input& source, const Input& target) noexcept {
+const Result& RegistrarState::align(const CloudRef& source, const CloudRef& target) noexcept {
   Stopwatch watch;
   result = Result{};
   workspace.deadline.start(options);
   workspace.recorder.clear();
-  const Input inputs[2] = {source, target};
+  const Input inputs[2] = {input(source), input(target)};
   result.status = run(model.data(), options, inputs, workspace, result);
   result.ms.total = watch.lap();
   return result;
@@ -305,20 +305,8 @@ Registrar::~Registrar() = default;
 Registrar::Registrar(Registrar&&) noexcept = default;
 Registrar& Registrar::operator=(Registrar&&) noexcept = default;
 
-const Result& Registrar::align(PointsView source, PointsView target) noexcept {
-  return state_->align({source}, {target});
-}
-
-const Result& Registrar::align(PointsView source, const PreparedCloud& target) noexcept {
-  return state_->align({source}, state_->input(target));
-}
-
-const Result& Registrar::align(const PreparedCloud& source, PointsView target) noexcept {
-  return state_->align(state_->input(source), {target});
-}
-
-const Result& Registrar::align(const PreparedCloud& source, const PreparedCloud& target) noexcept {
-  return state_->align(state_->input(source), state_->input(target));
+const Result& Registrar::align(CloudRef source, CloudRef target) noexcept {
+  return state_->align(source, target);
 }
 
 PreparedCloud Registrar::prepare(PointsView cloud) { return PreparedCloud(state_->prepare(cloud)); }
@@ -327,7 +315,7 @@ const std::vector<Stage>& Registrar::stages() const noexcept {
   return state_->workspace.recorder.stages();
 }
 
-Result align(PointsView source, PointsView target, const Options& options) {
+Result align(CloudRef source, CloudRef target, const Options& options) {
   static const Model model = Model::builtin();
   return Registrar{model, options}.align(source, target);
 }

@@ -17,6 +17,7 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -24,6 +25,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "vnreg/cancellation.hpp"
@@ -244,6 +246,26 @@ class VNREG_API PreparedCloud {
   std::shared_ptr<const detail::PreparedData> data_;
 };
 
+/// A cloud to align: points, as a PointsView or whatever makes one, or a prepared cloud. Borrowed
+/// for the time of the call.
+class CloudRef {
+ public:
+  CloudRef(const PreparedCloud& prepared) noexcept  // NOLINT: implicit on purpose
+      : points_(static_cast<const float*>(nullptr), 0), prepared_(&prepared.data()) {}
+  template <class... Args>
+  requires std::constructible_from<PointsView, Args...> CloudRef(
+      Args&&... args)  // NOLINT: implicit on purpose
+      : points_(std::forward<Args>(args)...) {}
+
+  const PointsView& points() const noexcept { return points_; }
+  /// Null if it is given by its points.
+  const detail::PreparedData* prepared() const noexcept { return prepared_; }
+
+ private:
+  PointsView points_;
+  const detail::PreparedData* prepared_ = nullptr;
+};
+
 /// Aligns pairs of clouds with one model. Owns its working memory; one per thread.
 class VNREG_API Registrar {
  public:
@@ -256,12 +278,8 @@ class VNREG_API Registrar {
   Registrar& operator=(const Registrar&) = delete;
 
   /// The pose that maps `source` onto `target`. Valid until the next call. Never throws: look at
-  /// `status` (any finite or non-finite input is allowed).
-  const Result& align(PointsView source, PointsView target) noexcept;
-  /// The same with what was prepared before; allocates nothing either.
-  const Result& align(PointsView source, const PreparedCloud& target) noexcept;
-  const Result& align(const PreparedCloud& source, PointsView target) noexcept;
-  const Result& align(const PreparedCloud& source, const PreparedCloud& target) noexcept;
+  /// `status` (any finite or non-finite input is allowed). Allocates nothing.
+  const Result& align(CloudRef source, CloudRef target) noexcept;
 
   /// Does once what align would do for this cloud each time. Throws std::bad_alloc only; look at
   /// the status of what it returns. What align returned before stays valid.
@@ -275,8 +293,8 @@ class VNREG_API Registrar {
 };
 
 struct CloudPair {
-  PointsView source;
-  PointsView target;
+  CloudRef source;
+  CloudRef target;
 };
 
 /// Aligns many pairs, one per thread at a time: for throughput, where Registrar is for latency. The
@@ -297,9 +315,6 @@ class VNREG_API BatchRegistrar {
   /// Allocates nothing and never throws. A cancellation leaves the remaining results with
   /// Status::cancelled.
   void align_many(std::span<const CloudPair> pairs, std::span<Result> results) noexcept;
-  /// Many sources, one target.
-  void align_many(std::span<const PointsView> sources, const PreparedCloud& target,
-                  std::span<Result> results) noexcept;
 
   /// As Registrar::prepare().
   PreparedCloud prepare(PointsView cloud);
@@ -309,7 +324,7 @@ class VNREG_API BatchRegistrar {
 };
 
 /// One call with the built-in model. Loads the model at its first use (thread-safe).
-VNREG_API Result align(PointsView source, PointsView target, const Options& options = {});
+VNREG_API Result align(CloudRef source, CloudRef target, const Options& options = {});
 /// The same for many pairs, by a BatchRegistrar.
 VNREG_API std::vector<Result> align_many(std::span<const CloudPair> pairs,
                                          const Options& options = {});

@@ -46,11 +46,12 @@ TEST_CASE_METHOD(Batch, "many sources to one prepared target") {
   const PreparedCloud by_single = single.prepare(target);
   BatchRegistrar batch(model, {.threads = 2});
   const PreparedCloud prepared = batch.prepare(target);
-  const std::vector<PointsView> views(sources.begin(), sources.end());
-  std::vector<Result> results(views.size());
-  batch.align_many(views, prepared, results);
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    check_same(results[i], single.align(views[i], by_single));
+  std::vector<CloudPair> to_prepared;
+  for (const Points& source : sources) to_prepared.push_back({source, prepared});
+  std::vector<Result> results(sources.size());
+  batch.align_many(to_prepared, results);
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    check_same(results[i], single.align(sources[i], by_single));
   }
 }
 

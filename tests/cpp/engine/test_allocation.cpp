@@ -144,7 +144,6 @@ TEST_CASE("prepared clouds, batches and budgets allocate nothing while they alig
   const PreparedCloud prepared[] = {registrar.prepare(target), registrar.prepare(many),
                                     registrar.prepare(few), registrar.prepare(Points{})};
   const CloudPair pairs[] = {{source, target}, {many, few}, {few, source}};
-  const PointsView views[] = {source, few, many};
   Result results[3];
   batch.align_many(pairs, results);  // the threads are made
   const long before = allocations;
@@ -152,7 +151,8 @@ TEST_CASE("prepared clouds, batches and budgets allocate nothing while they alig
     registrar.align(source, cloud);
     registrar.align(cloud, prepared[0]);
     limited.align(cloud, few);
-    batch.align_many(views, cloud, results);
+    const CloudPair to_prepared[] = {{source, cloud}, {few, cloud}, {cloud, many}};
+    batch.align_many(to_prepared, results);
   }
   batch.align_many(pairs, results);
   const long after = allocations;
