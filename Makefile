@@ -98,7 +98,7 @@ bench: python build $(VENV)/.bench ## times of kernels, engine, peers, runtimes,
 
 bench-compare: python ## this tree's benchmarks beside those of BASE=<commit>; fails where one is slower
 	@test -n "$(BASE)" || { echo "usage: make bench-compare BASE=<commit>"; exit 2; }
-	$(BENCH) compare $(BASE)
+	$(BENCH) compare $(BASE) $(COMPARE_ARGS)
 
 clean:
 	rm -rf build

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import os
 import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -88,6 +90,8 @@ def measured_part(
 
 
 def run_part(arguments: argparse.Namespace) -> None:
+    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
+    warnings.filterwarnings("ignore", category=FutureWarning)  # of torch, about torch
     found = parts()[arguments.name](settings_of(arguments))
     arguments.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
@@ -105,9 +109,10 @@ def write_report(arguments: argparse.Namespace) -> None:
 
 
 def compare(arguments: argparse.Namespace) -> None:
-    from vnreg_bench.compare import compare_commit
+    from vnreg_bench.compare import compare_commits
 
-    sys.exit(compare_commit(arguments.base, arguments.rounds, arguments.filter))
+    chosen = (arguments.base, arguments.other, arguments.rounds, arguments.filter)
+    sys.exit(compare_commits(*chosen))
 
 
 def main() -> None:
@@ -136,6 +141,7 @@ def main() -> None:
 
     other = commands.add_parser("compare", help="this tree beside a commit, benchmark by benchmark")
     other.add_argument("base", help="a commit")
+    other.add_argument("--with", dest="other", help="a commit, instead of this working tree")
     other.add_argument("--rounds", type=int, default=10)
     other.add_argument("--filter", default=".", help="of Google Benchmark")
     other.set_defaults(do=compare)

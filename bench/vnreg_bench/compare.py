@@ -1,9 +1,9 @@
-"""This working tree beside a commit: both are built, their benchmarks run in turns.
+"""This working tree (or a commit) beside a commit: both are built, their benchmarks run in turns.
 
-The ratio of a benchmark is the median over rounds of time here / time there. Noise is the standard
-error of that median, from the rounds' own spread. A benchmark is slower where its ratio exceeds
-1 + THRESHOLD by more than NOISE_FACTOR standard errors: so noise alone does not raise an alarm, and
-a slowdown within the threshold is not one.
+The ratio of a benchmark is the median over rounds of its time here over its time there. Noise is
+the standard error of that median, from the rounds' own spread. A benchmark is slower where its
+ratio exceeds 1 + THRESHOLD by more than NOISE_FACTOR standard errors: so noise alone does not raise
+an alarm, and a slowdown within the threshold is not one.
 """
 
 from __future__ import annotations
@@ -32,30 +32,40 @@ BUILD = ROOT / "build" / "compare"
 Rounds = dict[str, list[float]]  # nanoseconds of every round, by benchmark
 
 
-def compare_commit(base: str, rounds: int, chosen: str) -> int:
-    """Prints the table, writes build/compare/compare.json; 1 where a benchmark became slower."""
-    with tempfile.TemporaryDirectory() as folder:
-        tree = Path(folder) / "base"
-        _git("worktree", "add", "--detach", str(tree), base)
-        try:
-            builds = {
-                "base": build_tree(tree, BUILD / "base"),
-                "here": build_tree(ROOT, BUILD / "here"),
-            }
-        finally:
-            _git("worktree", "remove", "--force", str(tree))
-    times = run_rounds(builds["base"], builds["here"], rounds, chosen)
+def compare_commits(base: str, other: str | None, rounds: int, chosen: str) -> int:
+    """Prints the table, writes build/compare/compare.json; 1 where a benchmark became slower.
+
+    base: a commit. other: a commit, or None for the working tree.
+    """
+    builds = [build_commit(base, BUILD / "base")]
+    if other is None:
+        builds.append(build_tree(ROOT, BUILD / "other"))
+    else:
+        builds.append(build_commit(other, BUILD / "other"))
+    times = run_rounds(builds[0], builds[1], rounds, chosen)
     rows = compare_rounds(*times)
     alone = sorted(set(times[0]) ^ set(times[1]))
-    print(f"{cpu_field('model name')}: this tree / {base}, {rounds} rounds in turns\n")
+    name = other or "this tree"
+    print(f"{cpu_field('model name')}: {name} / {base}, {rounds} rounds in turns\n")
     print(comparison_table(rows))
     if alone:
         print(f"\nOnly in one of both: {', '.join(alone)}")
     slower = [row["name"] for row in rows if row["slower"]]
-    report = {"base": base, "rounds": rounds, "rows": rows, "only_in_one": alone}
+    report = {"base": base, "other": name, "rounds": rounds, "rows": rows, "only_in_one": alone}
     (BUILD / "compare.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     print(f"\n{len(slower)} of {len(rows)} slower by more than {100 * THRESHOLD:.0f} %")
     return 1 if slower else 0
+
+
+def build_commit(commit: str, build: Path) -> Path:
+    """As build_tree, of a commit, which is checked out for as long as that takes."""
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder) / "tree"
+        _git("worktree", "add", "--detach", str(tree), commit)
+        try:
+            return build_tree(tree, build)
+        finally:
+            _git("worktree", "remove", "--force", str(tree))
 
 
 def _git(*arguments: str) -> None:
@@ -66,7 +76,8 @@ def build_tree(tree: Path, build: Path) -> Path:
     """Its benchmarks, in a folder that is kept; returns that folder."""
     shutil.rmtree(build, ignore_errors=True)
     launcher = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
-    options = ["-DCMAKE_BUILD_TYPE=Release", "-DVNREG_BUILD_BENCH=ON", "-DVNREG_BUILD_TESTS=OFF"]
+    options = ["-DCMAKE_BUILD_TYPE=Release", "-DVNREG_BUILD_BENCH=ON"]
+    options += ["-DVNREG_BUILD_TESTS=OFF", "-DVNREG_BUILD_CLI=OFF"]
     configure = ["cmake", "-S", str(tree), "-B", str(build), "-G", "Ninja", *options, *launcher]
     # Paths from the tree's own root, so that equal sources come from ccache.
     environment = os.environ | {"CCACHE_BASEDIR": str(tree)}
@@ -76,16 +87,15 @@ def build_tree(tree: Path, build: Path) -> Path:
     return build
 
 
-def run_rounds(base: Path, here: Path, rounds: int, chosen: str) -> tuple[Rounds, Rounds]:
+def run_rounds(base: Path, other: Path, rounds: int, chosen: str) -> tuple[Rounds, Rounds]:
     """Times of every benchmark: in each round each program runs once, which first taking turns."""
     found: tuple[Rounds, Rounds] = ({}, {})
     options = ["--benchmark_min_time=0.02", f"--benchmark_filter={chosen}"]
     for number in range(rounds):
-        order = ((base, found[0]), (here, found[1]))
+        order = ((base, found[0]), (other, found[1]))
         for program in PROGRAMS:
             for build, times in order if number % 2 == 0 else reversed(order):
-                one_thread = run_benchmarks(build / program, options, cores=2)
-                _append(times, one_thread["benchmarks"])
+                _append(times, run_benchmarks(build / program, options, cores=2)["benchmarks"])
     return found
 
 
@@ -95,17 +105,17 @@ def _append(times: Rounds, runs: Sequence[Mapping[str, Any]]) -> None:
         times.setdefault(name, []).append(median)
 
 
-def compare_rounds(base: Rounds, here: Rounds) -> list[dict[str, Any]]:
+def compare_rounds(base: Rounds, other: Rounds) -> list[dict[str, Any]]:
     """One row for each benchmark of both, the slowest ratio first."""
     rows = [
-        {"name": name, **compare_times(base[name], here[name])} for name in base if name in here
+        {"name": name, **compare_times(base[name], other[name])} for name in base if name in other
     ]
     return sorted(rows, key=lambda row: -row["ratio"])
 
 
-def compare_times(base: Sequence[float], here: Sequence[float]) -> dict[str, Any]:
+def compare_times(base: Sequence[float], other: Sequence[float]) -> dict[str, Any]:
     """Ratio with its standard error, from the times of the same rounds (nanoseconds)."""
-    ratios = np.asarray(here) / np.asarray(base)
+    ratios = np.asarray(other) / np.asarray(base)
     ratio = float(np.median(ratios))
     # 1.4826 mad is the standard deviation of a normal distribution, 1.2533 / sqrt(n) of that the
     # standard error of its median.
@@ -113,7 +123,7 @@ def compare_times(base: Sequence[float], here: Sequence[float]) -> dict[str, Any
     noise = 1.2533 * deviation / math.sqrt(len(ratios))
     return {
         "base_ns": float(np.median(base)),
-        "here_ns": float(np.median(here)),
+        "other_ns": float(np.median(other)),
         "ratio": ratio,
         "noise": noise,
         "slower": ratio - NOISE_FACTOR * noise > 1 + THRESHOLD,
@@ -126,11 +136,11 @@ def comparison_table(rows: Sequence[Mapping[str, Any]]) -> str:
         (
             row["name"],
             f"{1e-3 * row['base_ns']:.2f}",
-            f"{1e-3 * row['here_ns']:.2f}",
+            f"{1e-3 * row['other_ns']:.2f}",
             f"{row['ratio']:.3f}",
             f"±{row['noise']:.3f}",
             "slower" if row["slower"] else "faster" if row["faster"] else "",
         )
         for row in rows
     ]
-    return table(("benchmark", "base, µs", "here, µs", "ratio", "noise", ""), lines)
+    return table(("benchmark", "base, µs", "other, µs", "ratio", "noise", ""), lines)
