@@ -5,12 +5,15 @@
 // leaves, and the distances in those leaves that could hold a neighbour. That is what an exact
 // search on this index has to do; time for ordering, selection and collection shows as the rest.
 #include <algorithm>
+#include <numeric>
+#include <random>
 
 #include "kernels/collect.hpp"
 #include "kernels/moments.hpp"
 #include "kernels/nearest_grid.hpp"
 #include "kernels/neighbours.hpp"
 #include "kernels/operands.hpp"
+#include "kernels/oriented_points.hpp"
 #include "roofline.hpp"
 
 namespace vnreg::bench {
@@ -173,19 +176,36 @@ void nearest_grid_fill(benchmark::State& state) {
 }
 BENCHMARK(nearest_grid_fill)->Arg(512)->Arg(1024)->Arg(2048)->Unit(benchmark::kMicrosecond);
 
-/// One look-up for each point of the cloud: the query, the cell, the point found.
+/// One look-up for each point of the cloud: the query, the cell, the place found.
 void nearest_grid_lookup(benchmark::State& state) {
   const Grid g(state.range(0));
   std::vector<std::uint16_t> found(static_cast<std::size_t>(state.range(0)));
   for (auto _ : state) {
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      found[i] = g.grid.nearest(g.points.x[i], g.points.y[i], g.points.z[i]);
-    }
+    g.grid.nearest(g.points.coordinates(), state.range(0), found.data());
     benchmark::ClobberMemory();
   }
   count(state, {9 * as_double(state.range(0)), (12 + 2 + 2) * as_double(state.range(0))});
 }
-BENCHMARK(nearest_grid_lookup)->Arg(1024)->Unit(benchmark::kMicrosecond);
+BENCHMARK(nearest_grid_lookup)->Arg(64)->Arg(1024);
+
+/// Points with normals by their places: a record and a place in, six numbers out.
+void gather_oriented_points(benchmark::State& state) {
+  const Index points_count = state.range(0);
+  const Floats records = random_floats(points_count * oriented_point_size);
+  std::vector<std::uint16_t> places(static_cast<std::size_t>(points_count));
+  std::iota(places.begin(), places.end(), std::uint16_t{0});
+  std::shuffle(places.begin(), places.end(), std::mt19937_64(1));
+  Floats out[6];
+  for (Floats& o : out) o = room(points_count);
+  const OrientedArrays arrays{out[0].data(), out[1].data(), out[2].data(),
+                              out[3].data(), out[4].data(), out[5].data()};
+  for (auto _ : state) {
+    gather_points(records.data(), places.data(), points_count, arrays);
+    benchmark::ClobberMemory();
+  }
+  count(state, {0, as_double(points_count) * (4 * oriented_point_size + 2 + 24)});
+}
+BENCHMARK(gather_oriented_points)->Arg(64)->Arg(1024);
 
 /// Moments of a cloud about half of its points (the encoded ones), at three radii. Counted: the
 /// powers of the offsets of every point within a radius, 40 flops each.
