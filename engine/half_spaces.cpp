@@ -45,8 +45,8 @@ void measure_extents(const kernels::Coordinates& points, Index count, float* pro
   }
 }
 
-Index count_beyond(const kernels::Coordinates& points, Index count,
-                   const Extents& extents) noexcept {
+HalfSpace most_beyond(const kernels::Coordinates& points, Index count,
+                      const Extents& extents) noexcept {
   alignas(64) float beyond[half_space_directions] = {};
   for (Index i = 0; i < count; ++i) {
     const float x = points.x[i], y = points.y[i], z = points.z[i];
@@ -56,7 +56,9 @@ Index count_beyond(const kernels::Coordinates& points, Index count,
       beyond[k] += along > extents[static_cast<std::size_t>(k)] ? 1.0f : 0.0f;
     }
   }
-  return static_cast<Index>(*std::max_element(beyond, beyond + half_space_directions));
+  const auto best = std::max_element(beyond, beyond + half_space_directions) - beyond;
+  return {directions.x[best], directions.y[best], directions.z[best],
+          extents[static_cast<std::size_t>(best)], static_cast<Index>(beyond[best])};
 }
 
 }  // namespace vnreg::detail

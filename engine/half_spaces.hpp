@@ -22,8 +22,20 @@ using Extents = std::array<float, static_cast<std::size_t>(half_space_directions
 void measure_extents(const kernels::Coordinates& points, Index count, float* projections,
                      Extents& extents) noexcept;
 
-/// The largest number of the given points that lie beyond the extent along one direction.
-Index count_beyond(const kernels::Coordinates& points, Index count,
-                   const Extents& extents) noexcept;
+/// A half-space that the cloud does not reach into, and how many of some points lie in it.
+struct HalfSpace {
+  float x = 0, y = 0, z = 0;  // its direction
+  float extent = 0;           // of the cloud along it
+  Index count = 0;
+
+  /// How far a place lies inside.
+  float depth(float px, float py, float pz) const noexcept {
+    return px * x + py * y + pz * z - extent;
+  }
+};
+
+/// Of the half-spaces beyond the extents, that with the most of the given points.
+HalfSpace most_beyond(const kernels::Coordinates& points, Index count,
+                      const Extents& extents) noexcept;
 
 }  // namespace vnreg::detail

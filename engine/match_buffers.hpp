@@ -28,7 +28,8 @@ struct Match {
 };
 
 struct MatchBuffers {
-  kernels::Floats similarity;  // source x target
+  kernels::Floats similarity;  // source x target: exp(similarity - largest)
+  float largest = 0;
   kernels::Floats row_sum, column_sum, column_weight;
   std::vector<Match> matches;
   kernels::Floats place[2][3];             // of the matches' points, per cloud and axis

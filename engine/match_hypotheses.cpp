@@ -51,11 +51,11 @@ void compare_descriptors(const CloudDescriptors& source, const CloudDescriptors&
           context.middleRows(c, width).transpose();
     }
   }
-  const float largest = similarity.maxCoeff();
+  b.largest = similarity.maxCoeff();
   std::fill_n(b.column_sum.data(), columns, 0.0f);
   Eigen::Map<Eigen::RowVectorXf> column_sum(b.column_sum.data(), columns);
   for (Index r = 0; r < rows; ++r) {
-    similarity.row(r) = (similarity.row(r).array() - largest).exp();
+    similarity.row(r) = (similarity.row(r).array() - b.largest).exp();
     b.row_sum[static_cast<std::size_t>(r)] = similarity.row(r).sum();
     column_sum += similarity.row(r);
   }

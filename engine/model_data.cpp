@@ -103,6 +103,7 @@ std::shared_ptr<const ModelData> read_model_data(const ModelFile& file) {
   TensorSet tensors(file);
   if (model->arch.family == Family::vnreg) {
     model->descriptor_model = read_descriptor_model(file, tensors);
+    model->judge = read_judge_model(file, tensors);
     tensors.refuse_others("vnreg");
     return model;
   }

@@ -7,6 +7,7 @@
 
 #include "engine/architecture.hpp"
 #include "engine/descriptor_model.hpp"
+#include "engine/judge_model.hpp"
 #include "kernels/invariant.hpp"
 #include "kernels/linear.hpp"
 #include "kernels/pair_features.hpp"
@@ -24,6 +25,7 @@ struct ModelData {
 
   // Architecture `vnreg`; nothing below belongs to it.
   std::optional<DescriptorModel> descriptor_model;
+  std::optional<JudgeModel> judge;
 
   // Encoder (paper, section III-A). The first block of network 0 includes the linear layer `pre`.
   kernels::EdgeBlock network0_first;

@@ -45,6 +45,7 @@ void take_points(const Cloud& cloud, float per_radius, Surface& s) noexcept {
     const auto place = static_cast<Index>(reversed(v, bits));
     if (place >= s.count) continue;
     const Index from = place * cloud.count / s.count;
+    s.origin[static_cast<std::size_t>(taken)] = cloud.index.original()[from];
     s.x[static_cast<std::size_t>(taken)] = ordered.x[from] * per_radius;
     s.y[static_cast<std::size_t>(taken)] = ordered.y[from] * per_radius;
     s.z[static_cast<std::size_t>(taken)] = ordered.z[from] * per_radius;
@@ -183,6 +184,7 @@ Surface::Surface(Index max_points) : index(std::min(max_points, most_surface_poi
     array->resize(points);
   }
   records.resize(points * static_cast<std::size_t>(kernels::oriented_point_size));
+  origin.resize(points);
   neighbours.resize(points * static_cast<std::size_t>(surface_neighbours));
   neighbour_places.resize(points * static_cast<std::size_t>(3 * neighbour_lanes));
   grid.allocate();

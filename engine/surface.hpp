@@ -28,6 +28,7 @@ inline constexpr Index neighbour_lanes = 16;
 /// it takes off in both clouds.
 struct Surface {
   Index count = 0;
+  std::vector<std::uint32_t> origin;  // which points of the cloud they are
   kernels::Floats x, y, z;
   kernels::Floats normal_x, normal_y, normal_z;  // unit length, of either sign
   kernels::Floats records;                       // the same, a record each (oriented_points.hpp)

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "engine/hypotheses.hpp"
+#include "engine/judge.hpp"
 #include "engine/match_hypotheses.hpp"
 #include "engine/refine.hpp"
 #include "engine/rigid.hpp"
@@ -203,6 +204,7 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
   parallel_for(w.threads, count, [&](Index i, int) {
     refine_if_better(final_refinements, everything, final_tolerance, Search::exact, v, poses[i]);
   });
+  judge_poses(poses, count, w);
   count =
       keep_distinct(poses, count, VerifiedPoses::capacity, alternative_degrees, alternative_radii);
   for (Index i = 0; i < count; ++i) {

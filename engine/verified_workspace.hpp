@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/judge_workspace.hpp"
 #include "engine/match_buffers.hpp"
 #include "engine/motion.hpp"
 #include "engine/surface.hpp"
@@ -55,7 +56,8 @@ struct VerifiedWorkspace {
   double radius = 1;  // the unit of length of the surfaces, in network coordinates
   float spacing = 0;  // of the sparser surface, in that unit
   PairTable table;
-  MatchBuffers match;  // empty without descriptors
+  MatchBuffers match;    // empty without descriptors
+  JudgeWorkspace judge;  // empty without descriptors
   /// kept_per_chunk of each chunk, and behind those that are found, those from matches.
   std::vector<Hypothesis> hypotheses;
   std::vector<Index> kept;        // how many of them each chunk has found

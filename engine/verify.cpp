@@ -58,15 +58,14 @@ void move(const Motion& m, const Surface& s, Index first, Matches& out) noexcept
 
 /// Sets the nearest points, and their normals, of the moved ones.
 void find_nearest(const Surface& fixed, Search search, Matches& out) noexcept {
-  std::uint16_t places[Matches::capacity];
-  fixed.grid.nearest({out.x, out.y, out.z}, out.count, places);
+  fixed.grid.nearest({out.x, out.y, out.z}, out.count, out.place);
   if (search == Search::exact) {
     for (Index i = 0; i < out.count; ++i) {
-      places[i] = step(fixed, places[i], out.x[i], out.y[i], out.z[i]);
+      out.place[i] = step(fixed, out.place[i], out.x[i], out.y[i], out.z[i]);
     }
   }
   kernels::gather_points(
-      fixed.records.data(), places, out.count,
+      fixed.records.data(), out.place, out.count,
       {out.nearest_x, out.nearest_y, out.nearest_z, out.normal_x, out.normal_y, out.normal_z});
 }
 
@@ -156,8 +155,9 @@ Fit one_sided_fit(const Motion& motion, const Surface& moving, const Surface& fi
   const float per_point = 1 / static_cast<float>(total);
   fit.agreement *= per_point;
   fit.unmatched = static_cast<float>(unmatched.count) * per_point;
-  fit.beyond = static_cast<float>(count_beyond({unmatched.x, unmatched.y, unmatched.z},
-                                               unmatched.count, fixed.extents)) *
+  fit.beyond = static_cast<float>(most_beyond({unmatched.x, unmatched.y, unmatched.z},
+                                              unmatched.count, fixed.extents)
+                                      .count) *
                per_point;
   return fit;
 }

@@ -16,6 +16,7 @@ struct Matches {
   static constexpr Index capacity = 64;
   Index count;
   alignas(64) float x[capacity], y[capacity], z[capacity];  // moved
+  alignas(64) std::uint16_t place[capacity];                // of the nearest, in the other surface
   alignas(64) float nearest_x[capacity], nearest_y[capacity], nearest_z[capacity];
   alignas(64) float normal_x[capacity], normal_y[capacity], normal_z[capacity];  // at the nearest
   alignas(64) float squared[capacity];                                           // distance

@@ -136,6 +136,10 @@ Workspace::Workspace(const ModelData& model, const Options& options, Index max_p
     const Index encoded =
         model.descriptor_model ? std::min(max_points, model.descriptor_model->arch.encoded) : 0;
     verified = VerifiedWorkspace(max_points, encoded);
+    if (model.descriptor_model) {
+      verified.judge = JudgeWorkspace(model.judge ? &*model.judge : nullptr, max_points, encoded,
+                                      threads, options.record_stages);
+    }
   }
   // The runtime makes its threads at the first parallel region: now, not in the first align.
   parallel_for(threads.count, threads.count, [](Index, int) {});

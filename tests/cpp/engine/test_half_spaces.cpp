@@ -41,7 +41,7 @@ Extents extents_of(const Points& points) {
 
 Index beyond(const Points& points, const Extents& extents) {
   const Axes axes(points);
-  return detail::count_beyond(axes.coordinates(), axes.count(), extents);
+  return detail::most_beyond(axes.coordinates(), axes.count(), extents).count;
 }
 
 /// The extents of a single point are its inner products with the directions.

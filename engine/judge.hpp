@@ -1,0 +1,15 @@
+// Which of the poses that are left is right (docs/design.md, "The judge"): a small network that
+// sees points of both clouds, as a pose lays them onto the other cloud, and what that cloud shows
+// there.
+#pragma once
+
+#include "engine/workspace.hpp"
+
+namespace vnreg::detail {
+
+/// Replaces the scores of `count` (at most final_poses) poses, in units of the surfaces, by the
+/// log-odds that they are right. Does nothing without a judge. Needs the pair's surfaces,
+/// descriptors and matches.
+void judge_poses(ScoredPose* poses, Index count, Workspace& workspace) noexcept;
+
+}  // namespace vnreg::detail
