@@ -37,7 +37,7 @@ void time_encoder(benchmark::State& state, const Model& model, const Options& op
   for (auto _ : state) {
     state.SetIterationTime(1e-3 * registrar.align(pair.source, pair.target).ms.encode);
   }
-  count(state, work);
+  count(state, work, options.threads);
 }
 
 /// Arguments: C, N, threads; L = C / 2.

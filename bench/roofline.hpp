@@ -25,8 +25,8 @@ struct Work {
 
 /// Adds counters to the benchmark: GFLOP/s, GB/s, and `share`, the least time that the roofline
 /// allows (the larger of flops over peak and bytes over the bandwidth of the level that holds them)
-/// over the time taken. The label names what bounds it.
-void count(benchmark::State& state, const Work& work);
+/// over the time taken, of as many cores as there are threads. The label names what bounds it.
+void count(benchmark::State& state, const Work& work, int threads = 1);
 
 /// Tells the roofline in the report's context, and registers it as benchmarks: run among the
 /// others, they tell whether the processor still does what it did at the start.

@@ -10,7 +10,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import warnings
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -72,8 +71,10 @@ def measured_part(
     command = [sys.executable, "-m", "vnreg_bench", "part", name]
     command += ["--build", str(arguments.build), "--data", str(arguments.data)]
     command += ["--quick"] if arguments.quick else []
-    # Threads that wait must not spin: runtimes share the processors.
-    environment = os.environ | {"OMP_WAIT_POLICY": "passive"}
+    environment = os.environ | {
+        "OMP_WAIT_POLICY": "passive",  # runtimes share the processors: who waits must not spin
+        "PYTHONWARNINGS": "ignore::FutureWarning",  # of torch, about torch
+    }
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "part.json"
         subprocess.run([*command, "--out", str(out)], check=True, env=environment)
@@ -91,7 +92,6 @@ def measured_part(
 
 def run_part(arguments: argparse.Namespace) -> None:
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)
-    warnings.filterwarnings("ignore", category=FutureWarning)  # of torch, about torch
     found = parts()[arguments.name](settings_of(arguments))
     arguments.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 

@@ -44,7 +44,8 @@ def kernels(settings: Settings) -> dict[str, Any]:
         "compiler": context["compiler"],
         "instruction_set": context["instruction set"],
         "roof": {
-            row["bound"]: row["GFLOP/s" if row["bound"] == "product" else "GB/s"] for row in roof
+            row["bound"]: row["GFLOP/s" if row["bound"] == "product" else "GB/s"]
+            for row in sorted(roof, key=lambda row: row["name"] != f"{ROOF}product")
         },
         "rows": against_roof([row for row in rows if row not in roof], roof),
     }

@@ -195,7 +195,7 @@ def contest_section(report: Report) -> list[str]:
                         _ms(t),
                         f"{_figure(t['q1'])}–{_figure(t['q3'])}",
                         f"{t['median'] / ours:.1f}×",
-                        f"{t['error']:.1e}",
+                        "" if runtime == "engine" else f"{t['error']:.1e}",
                     )
                 )
     return [
