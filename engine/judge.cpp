@@ -40,17 +40,20 @@ float log_odds(const JudgeModel& model, Index columns, float fit, const Verified
 
 /// What the judge is trained on: the poses (rows of (R | t), network coordinates), their fits and
 /// the inputs of their points.
-void record(const ScoredPose* poses, Index count, Index columns, Workspace& w) noexcept {
+void record(const ScoredPose* poses, const ScoredPose* judged, Index count, Index columns,
+            Workspace& w) noexcept {
   constexpr Index numbers = 12;
-  float rows[final_poses * numbers], fits[final_poses];
+  float rows[final_poses * numbers], fits[final_poses], log_odds[final_poses];
   for (Index i = 0; i < count; ++i) {
     Eigen::Map<Eigen::Matrix<float, 3, 4, Eigen::RowMajor>> row(rows + i * numbers);
     row.leftCols<3>() = poses[i].transform.rotation.cast<float>();
     row.col(3) = (w.verified.radius * poses[i].transform.translation).cast<float>();
     fits[i] = static_cast<float>(poses[i].score);
+    log_odds[i] = static_cast<float>(judged[i].score);
   }
   w.recorder.matrix("judge.", "poses", rows, numbers, numbers, count);
   w.recorder.list("judge.", "fit", fits, count);
+  if (w.verified.judge.model != nullptr) w.recorder.list("judge.", "log_odds", log_odds, count);
   w.recorder.matrix("judge.", "inputs", w.verified.judge.recorded.data(),
                     padded(judge_point_inputs), judge_point_inputs, count * columns);
 }
@@ -74,7 +77,7 @@ void judge_poses(ScoredPose* poses, Index count, Workspace& w) noexcept {
     judged[i].score = static_cast<double>(
         log_odds(*judge.model, columns, static_cast<float>(poses[i].score), w.verified, s));
   });
-  if (recording) record(poses, count, columns, w);
+  if (recording) record(poses, judged, count, columns, w);
   if (!w.deadline.expired()) std::copy_n(judged, count, poses);
 }
 

@@ -1,4 +1,4 @@
-"""`vnreg-train`: build the data, train both stages, export, evaluate."""
+"""`vnreg-train`: build the data, train networks and the judge, export, evaluate."""
 
 from __future__ import annotations
 
@@ -72,6 +72,30 @@ def train_stage(arguments: argparse.Namespace) -> None:
     trainer.run(max_minutes=arguments.minutes, progress=not arguments.quiet)
 
 
+def train_judge(arguments: argparse.Namespace) -> None:
+    import os
+
+    os.environ["OMP_NUM_THREADS"] = "1"
+    import torch
+
+    from vnreg_train.evaluate.symmetry import read_symmetries
+    from vnreg_train.training import judge_train
+    from vnreg_train.training.judge_samples import collect_samples
+
+    torch.set_num_threads(1)
+    model, out = Path(arguments.model), Path(arguments.out)
+    samples = collect_samples(
+        model,
+        "train",
+        judge_train.ROWS,
+        arguments.seeds,
+        read_symmetries(),
+        Path(arguments.data),
+    )
+    settings = judge_train.JudgeTraining(steps=arguments.steps)
+    judge_train.write_judge(model, out, judge_train.train_judge(samples, settings))
+
+
 def export(arguments: argparse.Namespace) -> None:
     from vnreg_train.export.checkpoint import export_checkpoint
 
@@ -120,6 +144,14 @@ def parser() -> argparse.ArgumentParser:
     fit.add_argument("--minutes", type=float, default=float("inf"), help="stop after so long")
     fit.add_argument("--quiet", action="store_true", help="no progress bar")
     fit.set_defaults(run_command=train)
+
+    judge = commands.add_parser("train-judge", help="train the judge of a .vnr file's poses")
+    judge.add_argument("model", help="a .vnr file of architecture vnreg")
+    judge.add_argument("--out", required=True, help="the model with its judge (may be itself)")
+    judge.add_argument("--data", default="data/furniture", help="folder of the shapes")
+    judge.add_argument("--seeds", nargs="+", type=int, default=[100, 101], help="of the pairs")
+    judge.add_argument("--steps", type=int, default=4000)
+    judge.set_defaults(run_command=train_judge)
 
     out = commands.add_parser("export", help="write a checkpoint's averaged weights as a .vnr file")
     out.add_argument("checkpoint")

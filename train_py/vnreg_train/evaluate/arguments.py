@@ -57,7 +57,7 @@ def _add_calibrate(command: argparse.ArgumentParser) -> None:
 def _add_find_symmetries(command: argparse.ArgumentParser) -> None:
     command.add_argument("--data", default="data/furniture")
     command.add_argument("--cache", default="data/furniture/cache", help="where packages are kept")
-    command.add_argument("--splits", nargs="+", default=["validation", "test"])
+    command.add_argument("--splits", nargs="+", default=["train", "validation", "test"])
     command.add_argument("--out", default="data/symmetries/furniture.json")
     command.set_defaults(run_command=_find_symmetries)
 

@@ -1,4 +1,4 @@
-"""The committed list of the symmetries of the validation and test shapes: its writer."""
+"""The committed list of the symmetries of the shapes: its writer."""
 
 from __future__ import annotations
 

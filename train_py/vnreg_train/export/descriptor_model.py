@@ -167,8 +167,10 @@ def import_descriptor_model(
         "context.vectors": network.pre_context.weight,
         "lengths": network.temperature,
     }
-    if set(destinations) != set(tensors):
-        differing = sorted(set(destinations) ^ set(tensors))
+    # The judge is a network of its own (networks/judge.py).
+    own = {name for name in tensors if not name.startswith("judge.")}
+    if set(destinations) != own:
+        differing = sorted(set(destinations) ^ own)
         raise ValueError(f"{path}: tensors missing or unknown: {', '.join(differing)}")
     for name, destination in destinations.items():
         value = torch.from_numpy(tensors[name])
