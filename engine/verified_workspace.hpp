@@ -61,7 +61,7 @@ struct VerifiedWorkspace {
   /// kept_per_chunk of each chunk, and behind those that are found, those from matches.
   std::vector<Hypothesis> hypotheses;
   std::vector<Index> kept;        // how many of them each chunk has found
-  std::vector<ScoredPose> poses;  // what is refined
+  std::vector<ScoredPose> poses;  // what is refined, behind what has been
 
   VerifiedWorkspace() = default;
   /// `encoded`: how many points of a cloud have descriptors, at most; 0 if the model makes none.
