@@ -92,7 +92,8 @@ def _stages(report: Report, axes: Axes) -> None:
             axes.barh([key.split("/")[0] for key in of], ms, left=left, label=name)
         left = [a + b for a, b in zip(left, ms, strict=True)]
     axes.set(xlabel="ms, median, 1,024 points, one thread")
-    axes.legend(ncols=3)
+    axes.invert_yaxis()
+    axes.legend(ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 
 def _latency(report: Report, axes: Axes) -> None:
