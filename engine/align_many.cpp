@@ -48,6 +48,8 @@ PreparedCloud BatchRegistrar::prepare(PointsView cloud) {
   return state_->registrars.front().prepare(cloud);
 }
 
+int BatchRegistrar::threads() const noexcept { return state_->threads; }
+
 std::vector<Result> align_many(std::span<const CloudPair> pairs, const Options& options) {
   static const Model model = Model::builtin();
   std::vector<Result> results(pairs.size());

@@ -319,6 +319,9 @@ class VNREG_API BatchRegistrar {
   /// As Registrar::prepare().
   PreparedCloud prepare(PointsView cloud);
 
+  /// How many pairs are worked on at a time.
+  int threads() const noexcept;
+
  private:
   std::unique_ptr<detail::BatchState> state_;
 };
