@@ -26,7 +26,7 @@ char scalar_code(const Py_buffer& buffer) noexcept {
 bool readable_as_is(const Py_buffer& buffer) noexcept {
   const char code = scalar_code(buffer);
   return (code == 'f' || code == 'd') && buffer.ndim == 2 && buffer.shape[1] == 3 &&
-         buffer.strides[1] == buffer.itemsize && buffer.strides[0] >= 0;
+         buffer.strides[0] >= 0 && buffer.strides[1] >= 0;
 }
 
 /// str() of an attribute.
@@ -67,8 +67,11 @@ nb::object new_array(std::span<const double> values, std::span<const std::size_t
 
 BorrowedPoints::BorrowedPoints(nb::handle points, const char* argument) {
   if (borrow(points)) return;
+  // Clouds and meshes of other libraries; what they are is decided in Python.
+  nb::object held = nb::module_::import_("vnreg._clouds").attr("points_of")(points);
+  if (borrow(held)) return;
   const nb::module_ numpy = nb::module_::import_("numpy");
-  if (!borrow(converted(numpy, points, argument))) throw nb::python_error();
+  if (!borrow(converted(numpy, held, argument))) throw nb::python_error();
 }
 
 BorrowedPoints::~BorrowedPoints() { PyBuffer_Release(&buffer_); }
@@ -90,10 +93,11 @@ bool BorrowedPoints::borrow(nb::handle points) {
 PointsView BorrowedPoints::view() const noexcept {
   const auto count = static_cast<std::size_t>(buffer_.shape[0]);
   const auto stride = static_cast<std::size_t>(buffer_.strides[0]);
+  const auto axis_stride = static_cast<std::size_t>(buffer_.strides[1]);
   if (scalar_code(buffer_) == 'f') {
-    return {static_cast<const float*>(buffer_.buf), count, stride};
+    return {static_cast<const float*>(buffer_.buf), count, stride, axis_stride};
   }
-  return {static_cast<const double*>(buffer_.buf), count, stride};
+  return {static_cast<const double*>(buffer_.buf), count, stride, axis_stride};
 }
 
 nb::object float_array(std::span<const double> values, std::span<const std::size_t> shape) {

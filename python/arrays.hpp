@@ -14,8 +14,9 @@ namespace vnreg::python {
 /// the GIL held, read it with or without.
 class BorrowedPoints {
  public:
-  /// float32 and float64 rows of three adjacent numbers, any distance apart, are borrowed; any
-  /// other layout, integers and other floating types are converted to a float64 copy.
+  /// float32 and float64 with strides that are not negative are borrowed; other layouts, integers
+  /// and other floating types are converted to a float64 copy. Clouds and meshes of Open3D and
+  /// trimesh: what vnreg._clouds.points_of() takes from them.
   /// Throws ValueError (shape) or TypeError (not numbers), naming the argument.
   BorrowedPoints(nanobind::handle points, const char* argument);
   ~BorrowedPoints();

@@ -1,11 +1,23 @@
 import os
-from typing import Literal
+from collections.abc import Iterable
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _Mode = Literal["coarse", "paper", "verified"]
-_Status = Literal["ok", "low_confidence", "ambiguous", "too_few_points", "not_finite", "degenerate"]
+_Status = Literal[
+    "ok",
+    "low_confidence",
+    "ambiguous",
+    "too_few_points",
+    "not_finite",
+    "degenerate",
+    "timed_out",
+    "cancelled",
+]
+# Any: the clouds and meshes of Open3D and trimesh, which need not be installed.
+_Cloud: TypeAlias = ArrayLike | PreparedCloud | Any
 
 __version__: str
 
@@ -69,6 +81,18 @@ class Result:
     @property
     def ms(self) -> dict[str, float]: ...
 
+class PreparedCloud:
+    @property
+    def status(self) -> _Status: ...
+    def __len__(self) -> int: ...
+
+class Cancellation:
+    def __init__(self) -> None: ...
+    def request(self) -> None: ...
+    def reset(self) -> None: ...
+    @property
+    def requested(self) -> bool: ...
+
 class Registrar:
     def __init__(
         self,
@@ -79,17 +103,31 @@ class Registrar:
         max_points: int = 0,
         seed: int = 0,
         record_stages: bool = False,
+        time_budget_ms: float = 0.0,
+        cancellation: Cancellation | None = None,
     ) -> None: ...
-    def align(self, source: ArrayLike, target: ArrayLike) -> Result: ...
+    def align(self, source: _Cloud, target: _Cloud) -> Result: ...
+    def prepare(self, cloud: ArrayLike | Any) -> PreparedCloud: ...
     def stages(self) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]: ...
 
 def align(
-    source: ArrayLike,
-    target: ArrayLike,
+    source: _Cloud,
+    target: _Cloud,
     *,
     model: Model | None = None,
     mode: _Mode = "verified",
     threads: int = 1,
     max_points: int = 0,
     seed: int = 0,
+    time_budget_ms: float = 0.0,
 ) -> Result: ...
+def align_many(
+    pairs: Iterable[tuple[_Cloud, _Cloud]],
+    *,
+    model: Model | None = None,
+    mode: _Mode = "verified",
+    threads: int = 0,
+    max_points: int = 0,
+    seed: int = 0,
+    time_budget_ms: float = 0.0,
+) -> list[Result]: ...

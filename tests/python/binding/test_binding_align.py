@@ -116,6 +116,8 @@ def test_large_clouds_are_subsampled_by_the_seed(model: vnreg.Model) -> None:
         ({"max_points": 10}, "max_points"),
         ({"max_points": -5}, "max_points"),
         ({"max_points": 100_000}, "max_points"),
+        ({"time_budget_ms": -1.5}, "time_budget_ms"),
+        ({"time_budget_ms": float("nan")}, "time_budget_ms"),
     ],
 )
 def test_options_out_of_range_name_the_field(
@@ -124,6 +126,7 @@ def test_options_out_of_range_name_the_field(
     for call in (
         lambda: vnreg.Registrar(model, **options),
         lambda: vnreg.align(pair.source, pair.target, model=model, **options),
+        lambda: vnreg.align_many([(pair.source, pair.target)], model=model, **options),
     ):
         with pytest.raises(vnreg.Error) as caught:
             call()

@@ -1,0 +1,14 @@
+// The parts of the module; each adds its classes and functions.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+namespace vnreg::python {
+
+void bind_model(nanobind::module_& module);
+/// Result and Alternative.
+void bind_result(nanobind::module_& module);
+/// Registrar, PreparedCloud, Cancellation, align and align_many.
+void bind_registrar(nanobind::module_& module);
+
+}  // namespace vnreg::python
