@@ -11,10 +11,12 @@ namespace {
 
 double sigmoid(double x) noexcept { return 1 / (1 + std::exp(-x)); }
 
-/// How far the best pose stands out: 1 alone, 0 beside one that is as good.
+/// How far the best pose stands out: 1 alone, 0 beside one that is as good. 1 less the ratio of the
+/// odds, or of the fits.
 double margin_of(const VerifiedPoses& poses) noexcept {
   if (poses.count < 2) return 1;
   const double best = poses.pose[0].score;
+  if (poses.judged) return -std::expm1(poses.pose[1].score - best);
   return best > 0 ? std::clamp(1 - poses.pose[1].score / best, 0.0, 1.0) : 0;
 }
 

@@ -60,10 +60,10 @@ void record(const ScoredPose* poses, const ScoredPose* judged, Index count, Inde
 
 }  // namespace
 
-void judge_poses(ScoredPose* poses, Index count, Workspace& w) noexcept {
+bool judge_poses(ScoredPose* poses, Index count, Workspace& w) noexcept {
   JudgeWorkspace& judge = w.verified.judge;
   const bool recording = w.recorder.enabled();
-  if (judge.scratch.empty() || (judge.model == nullptr && !recording)) return;
+  if (judge.scratch.empty() || (judge.model == nullptr && !recording)) return false;
   choose_judged_points(w);
   const Index columns = judge.cloud[0].points.count + judge.cloud[1].points.count;
   const Index stride = columns * padded(judge_point_inputs);
@@ -78,7 +78,9 @@ void judge_poses(ScoredPose* poses, Index count, Workspace& w) noexcept {
         log_odds(*judge.model, columns, static_cast<float>(poses[i].score), w.verified, s));
   });
   if (recording) record(poses, judged, count, columns, w);
-  if (!w.deadline.expired()) std::copy_n(judged, count, poses);
+  if (judge.model == nullptr || w.deadline.expired()) return false;
+  std::copy_n(judged, count, poses);
+  return true;
 }
 
 }  // namespace vnreg::detail

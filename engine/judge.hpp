@@ -8,8 +8,8 @@
 namespace vnreg::detail {
 
 /// Replaces the scores of `count` (at most final_poses) poses, in units of the surfaces, by the
-/// log-odds that they are right. Does nothing without a judge. Needs the pair's surfaces,
-/// descriptors and matches.
-void judge_poses(ScoredPose* poses, Index count, Workspace& workspace) noexcept;
+/// log-odds that they are right. Without a judge it does nothing, and returns false. Needs the
+/// pair's surfaces, descriptors and matches.
+bool judge_poses(ScoredPose* poses, Index count, Workspace& workspace) noexcept;
 
 }  // namespace vnreg::detail

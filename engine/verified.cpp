@@ -46,10 +46,13 @@ constexpr double clear_gain = 0.02;
 // Poses closer than this count as one answer.
 constexpr double alternative_degrees = 15;
 constexpr float alternative_radii = 0.1f;
-// Below the best pose's score, in parts of its size: how far an alternative may lie, and one so
-// near that which of both is right cannot be told.
-constexpr double alternative_gap = 0.2;
-constexpr double ambiguous_gap = 0.03;
+// Below the best pose's score: how far an alternative may lie, and one so near that which of both
+// is right cannot be told. Of the judge's log-odds; of fits, in parts of the best one's size.
+struct Gaps {
+  double alternative, ambiguous;
+};
+constexpr Gaps judged_gaps = {4.0, 0.7};
+constexpr Gaps fit_gaps = {0.2, 0.03};
 
 float cosine_of(double degrees) noexcept {
   return static_cast<float>(std::cos(degrees * std::numbers::pi / 180));
@@ -63,9 +66,10 @@ RigidTransform to_transform(const Motion& motion) noexcept {
   return transform;
 }
 
-/// Scores may be negative: a gap is taken off their size.
-bool within_gap(double score, double best, double gap) noexcept {
-  return score >= best - gap * std::abs(best);
+/// How far below the best score the gap reaches. Fits may be negative.
+Gaps gaps_below(double best, bool judged) noexcept {
+  if (judged) return judged_gaps;
+  return {fit_gaps.alternative * std::abs(best), fit_gaps.ambiguous * std::abs(best)};
 }
 
 RigidTransform in_units(const RigidTransform& t, double factor) noexcept {
@@ -226,11 +230,12 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
     times.hypotheses += watch.lap();
     count = add_pair_poses(count, given, poses, w);
   }
-  judge_poses(poses, count, w);
+  result.judged = judge_poses(poses, count, w);
   count =
       keep_distinct(poses, count, VerifiedPoses::capacity, alternative_degrees, alternative_radii);
-  for (Index i = 0; i < count; ++i) {
-    if (!within_gap(poses[i].score, poses[0].score, alternative_gap)) break;
+  const double least =
+      count > 0 ? poses[0].score - gaps_below(poses[0].score, result.judged).alternative : 0;
+  for (Index i = 0; i < count && poses[i].score >= least; ++i) {
     result.pose[result.count++] = {in_units(orthonormal(poses[i].transform), v.radius),
                                    poses[i].score};
   }
@@ -239,7 +244,9 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
 }
 
 bool ambiguous(const VerifiedPoses& poses) noexcept {
-  return poses.count > 1 && within_gap(poses.pose[1].score, poses.pose[0].score, ambiguous_gap);
+  if (poses.count < 2) return false;
+  const double best = poses.pose[0].score;
+  return poses.pose[1].score >= best - gaps_below(best, poses.judged).ambiguous;
 }
 
 }  // namespace vnreg::detail

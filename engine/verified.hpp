@@ -12,7 +12,8 @@ namespace vnreg::detail {
 struct VerifiedPoses {
   static constexpr Index capacity = 5;
   Index count = 0;
-  ScoredPose pose[capacity];  // network coordinates; score from 0 to 1
+  ScoredPose pose[capacity];  // network coordinates
+  bool judged = false;        // scores are the judge's log-odds, else those of fits
 };
 
 /// `proposals` (at most most_proposals): poses of other registers, refined and compared like the

@@ -149,8 +149,8 @@ def parser() -> argparse.ArgumentParser:
     judge.add_argument("model", help="a .vnr file of architecture vnreg")
     judge.add_argument("--out", required=True, help="the model with its judge (may be itself)")
     judge.add_argument("--data", default="data/furniture", help="folder of the shapes")
-    judge.add_argument("--seeds", nargs="+", type=int, default=[100, 101], help="of the pairs")
-    judge.add_argument("--steps", type=int, default=4000)
+    judge.add_argument("--seeds", nargs="+", type=int, default=[100], help="of the pairs")
+    judge.add_argument("--steps", type=int, default=10000)
     judge.set_defaults(run_command=train_judge)
 
     out = commands.add_parser("export", help="write a checkpoint's averaged weights as a .vnr file")

@@ -100,8 +100,9 @@ struct StageTimes {       // milliseconds
 /// A pose that fits the clouds, and how well.
 struct Alternative {
   Pose T_target_source = identity_pose;
-  /// At most 1, of identical surfaces: how far each cloud's surface lies on the other's, less what
-  /// contradicts the pose; below 0 where more speaks against it.
+  /// What poses are ranked by. Of a model with a judge: its log-odds that the pose is right, before
+  /// calibration. Else how far each cloud's surface lies on the other's, less what contradicts the
+  /// pose: at most 1, of identical surfaces.
   double score = 0;
 };
 
@@ -138,7 +139,7 @@ inline constexpr Covariance unknown_covariance = [] {
 /// neighbouring points (the sparser cloud's).
 struct Evidence {
   double score = std::numeric_limits<double>::quiet_NaN();  // of the pose
-  double margin = score;        // 1 - second best score / score; 1 where there is no other pose
+  double margin = score;        // 1 - odds of the second best pose / odds; 1 where there is none
   double covered = score;       // share of the points of both clouds that have a match in the other
   double contradicted = score;  // share without, where the other cloud should show something
   double beyond = score;        // share without, outside of what the other cloud shows
@@ -171,9 +172,9 @@ struct Result {
   double overlap = 0;
   double rmse = 0;  // root mean square nearest-point distance of those inliers, input units
   double inlier_distance = 0;  // input units
-  /// Mode verified: the score of T_target_source, and the other poses that score at least 80 % of
-  /// it and differ from it and from each other by 15 degrees or 0.1 r.m.s. radii. Else NaN and
-  /// none.
+  /// Mode verified: the score of T_target_source, and the other poses that score nearly as well (at
+  /// most 4 less; without a judge, at least 80 %) and differ from it and from each other by 15
+  /// degrees or 0.1 r.m.s. radii. Else NaN and none.
   double score = std::numeric_limits<double>::quiet_NaN();
   Alternatives alternatives;
   Evidence evidence;              // mode verified; else NaN

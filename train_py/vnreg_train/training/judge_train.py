@@ -41,12 +41,12 @@ ROWS = (
 
 @dataclass(frozen=True)
 class JudgeTraining:
-    hidden: int = 32
-    steps: int = 4000
+    hidden: int = 48
+    steps: int = 10000
     batch: int = 24  # pairs
     points: int = 24  # of each cloud, drawn anew for every step
     learning_rate: float = 3e-3
-    weight_decay: float = 0.3
+    weight_decay: float = 0.1
     average_decay: float = 0.99
     seed: int = 0
 
