@@ -17,7 +17,6 @@ struct PreparedData {
   Index max_points;
 
   Status status = Status::degenerate;
-  double scale = 1;  // of its network coordinates
   Cloud cloud;
   Floats global;
   Floats paper_descriptors, significance;  // of a model with a fine register

@@ -62,30 +62,27 @@ Status first_failure(Status source, Status target) noexcept {
   return Status::ok;
 }
 
-/// What the scale of a cloud alone would be.
-double scale_of(const ModelData& model, const Cloud& cloud) noexcept {
-  return model.arch.rms_radius == 0.0 ? 1.0 : cloud.rms_radius / model.arch.rms_radius;
+/// The length that is 1 in network coordinates, if a cloud of this r.m.s. radius sets it.
+double scale_of(const ModelData& model, double radius) noexcept {
+  return model.arch.rms_radius == 0.0 ? 1.0 : radius / model.arch.rms_radius;
 }
 
-/// One length for both clouds, and which of them have to be computed in it. 0 when it is not a
-/// positive number.
-double common_scale(const ModelData& model, const Input inputs[2], Workspace& w) noexcept {
-  const double scales[2] = {scale_of(model, w.cloud[0]), scale_of(model, w.cloud[1])};
-  const Index larger = scales[0] >= scales[1] ? 0 : 1;
-  const double largest = scales[larger];
+/// The r.m.s. radius that sets the pair's scale: the larger one, unless a prepared cloud is nearly
+/// as large. w.sides becomes the clouds that have to be computed in that scale.
+double choose_radius(const Input inputs[2], Workspace& w) noexcept {
+  const double radius[2] = {w.cloud[0].rms_radius, w.cloud[1].rms_radius};
+  const Index larger = radius[0] >= radius[1] ? 0 : 1;
+  const bool smaller_sets = inputs[larger].prepared == nullptr &&
+                            inputs[1 - larger].prepared != nullptr &&
+                            radius[larger] <= most_excess * radius[1 - larger];
+  const double chosen = smaller_sets ? radius[1 - larger] : radius[larger];
+  const auto fits = [&](Index side) {
+    return inputs[side].prepared != nullptr && radius[side] == chosen;
+  };
   w.sides = both_sides;
-  if (!std::isfinite(largest)) return 0.0;
-  bool fits[2];
-  double scale = largest;
-  if (inputs[larger].prepared == nullptr && inputs[1 - larger].prepared != nullptr &&
-      largest <= most_excess * scales[1 - larger]) {
-    scale = scales[1 - larger];
-  }
-  for (Index side = 0; side < 2; ++side) {
-    fits[side] = inputs[side].prepared != nullptr && inputs[side].prepared->scale == scale;
-  }
-  if (fits[0] || fits[1]) w.sides = w.sides.subspan(fits[0] ? 1 : 0, fits[0] && fits[1] ? 0 : 1);
-  return scale;
+  if (fits(1)) w.sides = w.sides.first(1);
+  if (fits(0)) w.sides = w.sides.subspan(1);
+  return chosen;
 }
 
 /// The points used, centroid and radius.
@@ -113,8 +110,10 @@ Status prepare(const ModelData& model, const Options& options, const Input input
   });
   if (w.deadline.expired()) return unfinished(w.deadline);
   if (const Status s = first_failure(status[0], status[1]); s != Status::ok) return s;
-  scale = common_scale(model, inputs, w);
-  if (scale == 0.0) return Status::degenerate;
+  const double radius = choose_radius(inputs, w);
+  scale = scale_of(model, radius);
+  if (!std::isfinite(scale) || scale == 0.0) return Status::degenerate;
+  w.verified.radius = radius / scale;
   for (const Index side : w.sides) {
     if (!normalize(scale, w.cloud[side])) return Status::degenerate;
   }
@@ -244,22 +243,23 @@ Status run(const ModelData& model, const Options& options, const Input inputs[2]
 
 /// All that a side can have alone, with the other one empty.
 Status run_alone(const ModelData& model, const Options& options, const PointsView& points,
-                 Workspace& w, double& scale) noexcept {
+                 Workspace& w) noexcept {
   constexpr Index side = 0;
   const Status gathered =
       gather(points, model.arch.min_points(), options.seed, w.deadline, w.cloud[side]);
   if (w.deadline.expired()) return unfinished(w.deadline);
   if (gathered != Status::ok) return gathered;
-  scale = scale_of(model, w.cloud[side]);
-  if (!std::isfinite(scale) || !normalize(scale, w.cloud[side])) return Status::degenerate;
+  const double radius = w.cloud[side].rms_radius;
+  const double scale = scale_of(model, radius);
+  if (!std::isfinite(scale) || scale == 0.0 || !normalize(scale, w.cloud[side])) {
+    return Status::degenerate;
+  }
+  w.verified.radius = radius / scale;
   w.sides = Sides(both_sides).first(1);
   find_neighbourhoods(model, w);
   encode(model, options, w);
   if (w.local) encode_local(model, w);
-  if (options.mode == Mode::verified) {
-    w.verified.radius = network_radius(w.cloud[side]);
-    fit_surfaces(w);
-  }
+  if (options.mode == Mode::verified) fit_surfaces(w);
   return w.deadline.expired() ? unfinished(w.deadline) : Status::ok;
 }
 
@@ -287,7 +287,7 @@ const Result& RegistrarState::align(const CloudRef& source, const CloudRef& targ
 std::shared_ptr<const PreparedData> RegistrarState::prepare(const PointsView& points) {
   workspace.deadline.start(options);
   auto prepared = std::make_shared<PreparedData>(model, options, max_points);
-  prepared->status = run_alone(model.data(), options, points, workspace, prepared->scale);
+  prepared->status = run_alone(model.data(), options, points, workspace);
   store(workspace, 0, *prepared);
   workspace.recorder.clear();
   return prepared;

@@ -165,16 +165,6 @@ void for_each_chunk(Workspace& w, Sides sides, Index chunk, const Total& total,
   });
 }
 
-/// The unit of length of the surfaces: that of a prepared cloud is in its surface already.
-double unit_of(const Workspace& w) noexcept {
-  double radius = 0;
-  for (Index side = 0; side < 2; ++side) {
-    if (!contains(w.sides, side)) return network_radius(w.cloud[side]);
-    radius = std::max(radius, network_radius(w.cloud[side]));
-  }
-  return radius;
-}
-
 }  // namespace
 
 Surface::Surface(Index max_points) : index(std::min(max_points, most_surface_points)) {
@@ -188,17 +178,6 @@ Surface::Surface(Index max_points) : index(std::min(max_points, most_surface_poi
   neighbours.resize(points * static_cast<std::size_t>(surface_neighbours));
   neighbour_places.resize(points * static_cast<std::size_t>(3 * neighbour_lanes));
   grid.allocate();
-}
-
-double network_radius(const Cloud& cloud) noexcept {
-  double squares = 0;
-  for (const kernels::Floats* axis : {&cloud.x, &cloud.y, &cloud.z}) {
-    for (std::size_t i = 0; i < static_cast<std::size_t>(cloud.count); ++i) {
-      const auto value = static_cast<double>((*axis)[i]);
-      squares += value * value;
-    }
-  }
-  return std::sqrt(squares / static_cast<double>(cloud.count));
 }
 
 void fit_surfaces(Workspace& w) noexcept {
@@ -225,7 +204,6 @@ void fit_surfaces(Workspace& w) noexcept {
 
 bool build_surfaces(Workspace& w) noexcept {
   Surface* surface = w.verified.surface;
-  w.verified.radius = unit_of(w);
   if (!(w.verified.radius > smallest_radius)) return false;
   fit_surfaces(w);
   if (surface[0].line || surface[1].line) return false;

@@ -54,15 +54,13 @@ struct Surface {
   kernels::Coordinates coordinates() const noexcept { return {x.data(), y.data(), z.data()}; }
 };
 
-/// R.m.s. distance to the centroid, in network coordinates.
-double network_radius(const Cloud& cloud) noexcept;
-
 /// Points, planes and spacing of the surfaces of the clouds to compute, in units of
 /// workspace.verified.radius.
 void fit_surfaces(Workspace& workspace) noexcept;
 
-/// Fills workspace.verified.surface, .radius and .spacing from the clouds to compute (the surface
-/// of a prepared cloud must be there). False if a cloud is a line or a point.
+/// Fills workspace.verified.surface and .spacing from the clouds to compute (the surface of a
+/// prepared cloud must be there), in units of workspace.verified.radius. False if a cloud is a line
+/// or a point.
 bool build_surfaces(Workspace& workspace) noexcept;
 
 }  // namespace vnreg::detail

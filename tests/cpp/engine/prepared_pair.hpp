@@ -31,6 +31,7 @@ class PreparedPair {
     detail::gather(target, 1, 0, workspace_.deadline, cloud[1]);
     const double radius = std::max(cloud[0].rms_radius, cloud[1].rms_radius);
     if (radius > 0) scale_ = radius / shipped_model().data().arch.rms_radius;
+    workspace_.verified.radius = radius / scale_;
     for (int side = 0; side < 2; ++side) detail::normalize(scale_, cloud[side]);
     detail::find_neighbourhoods(shipped_model().data(), workspace_);
     built_ = detail::build_surfaces(workspace_);

@@ -44,6 +44,22 @@ TEST_CASE_METHOD(Pair, "the larger cloud prepared: the same bits, on either side
   }
 }
 
+TEST_CASE_METHOD(Pair, "where coordinates are taken as given, surfaces still share one unit") {
+  Registrar registrar(random_model({.rms_radius = 0}).build(), {.threads = 1});
+  const Result expected = registrar.align(small, large);
+  const PreparedCloud source = registrar.prepare(small), target = registrar.prepare(large);
+  check_same(registrar.align(source, target), expected);
+  check_same(registrar.align(small, target), expected);
+}
+
+TEST_CASE_METHOD(Pair, "radii that differ by rounding alone") {
+  Registrar registrar(shipped(), {.threads = 1});
+  const Points turned = moved(small, truth);
+  const Result expected = registrar.align(small, turned);
+  const PreparedCloud source = registrar.prepare(small), target = registrar.prepare(turned);
+  check_same(registrar.align(source, target), expected);
+}
+
 TEST_CASE_METHOD(Pair, "two prepared clouds give the bits of their points") {
   Registrar registrar(shipped(), {.threads = 1});
   const Result expected = registrar.align(small, large);
