@@ -2,12 +2,28 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <limits>
 #include <numbers>
 
 namespace vnreg::detail {
 namespace {
 
+using Eigen::internal::padd;
+using Eigen::internal::pand;
+using Eigen::internal::pcmp_lt;
+using Eigen::internal::pload;
+using Eigen::internal::ploadu;
+using Eigen::internal::pmadd;
+using Eigen::internal::pmax;
+using Eigen::internal::pmin;
+using Eigen::internal::pmul;
+using Eigen::internal::pset1;
+using Eigen::internal::pstore;
+using Eigen::internal::pstoreu;
+using kernels::packet_size;
+using Packet = kernels::Packet;
+
+static_assert(half_space_directions % (2 * packet_size) == 0);
 constexpr Index points_per_excess = 80;
 
 struct Directions {
@@ -29,32 +45,60 @@ struct Directions {
 
 const Directions directions;
 
+/// The projections of a point on as many directions, from the k-th on, as a packet has lanes.
+struct Lanes {
+  Packet x, y, z;
+
+  explicit Lanes(Index k) noexcept
+      : x(pload<Packet>(directions.x + k)),
+        y(pload<Packet>(directions.y + k)),
+        z(pload<Packet>(directions.z + k)) {}
+
+  Packet along(const kernels::Coordinates& points, Index i) const noexcept {
+    return pmadd(pset1<Packet>(points.z[i]), z,
+                 pmadd(pset1<Packet>(points.y[i]), y, pmul(pset1<Packet>(points.x[i]), x)));
+  }
+};
+
 }  // namespace
 
-void measure_extents(const kernels::Coordinates& points, Index count, float* projections,
-                     Extents& extents) noexcept {
+void measure_extents(const kernels::Coordinates& points, Index count, Extents& extents) noexcept {
+  constexpr Index most_kept = most_extent_points / points_per_excess + 1;
   const Index excess = count / points_per_excess;
-  for (Index k = 0; k < half_space_directions; ++k) {
-    const float dx = directions.x[k], dy = directions.y[k], dz = directions.z[k];
-#pragma omp simd
+  for (Index k = 0; k < half_space_directions; k += packet_size) {
+    const Lanes lanes(k);
+    // The largest projections so far, descending.
+    Packet largest[most_kept];
+    for (Packet& kept : largest) kept = pset1<Packet>(-std::numeric_limits<float>::infinity());
     for (Index i = 0; i < count; ++i) {
-      projections[i] = points.x[i] * dx + points.y[i] * dy + points.z[i] * dz;
+      Packet rest = lanes.along(points, i);
+      for (Packet& kept : largest) {
+        const Packet smaller = pmin(kept, rest);
+        kept = pmax(kept, rest);
+        rest = smaller;
+      }
     }
-    std::nth_element(projections, projections + excess, projections + count, std::greater<>());
-    extents[static_cast<std::size_t>(k)] = projections[excess];
+    pstoreu(extents.data() + k, largest[excess]);
   }
 }
 
 HalfSpace most_beyond(const kernels::Coordinates& points, Index count,
                       const Extents& extents) noexcept {
-  alignas(64) float beyond[half_space_directions] = {};
-  for (Index i = 0; i < count; ++i) {
-    const float x = points.x[i], y = points.y[i], z = points.z[i];
-#pragma omp simd
-    for (Index k = 0; k < half_space_directions; ++k) {
-      const float along = x * directions.x[k] + y * directions.y[k] + z * directions.z[k];
-      beyond[k] += along > extents[static_cast<std::size_t>(k)] ? 1.0f : 0.0f;
+  alignas(64) float beyond[half_space_directions];
+  const Packet one = pset1<Packet>(1.0f);
+  for (Index k = 0; k < half_space_directions; k += 2 * packet_size) {
+    const Lanes lanes[2] = {Lanes(k), Lanes(k + packet_size)};
+    const Packet extent[2] = {ploadu<Packet>(extents.data() + k),
+                              ploadu<Packet>(extents.data() + k + packet_size)};
+    Packet sum[2] = {pset1<Packet>(0.0f), pset1<Packet>(0.0f)};
+    for (Index i = 0; i < count; ++i) {
+      for (int half = 0; half < 2; ++half) {
+        const Packet outside = pcmp_lt(extent[half], lanes[half].along(points, i));
+        sum[half] = padd(sum[half], pand(outside, one));
+      }
     }
+    pstore(beyond + k, sum[0]);
+    pstore(beyond + k + packet_size, sum[1]);
   }
   const auto best = std::max_element(beyond, beyond + half_space_directions) - beyond;
   return {directions.x[best], directions.y[best], directions.z[best],

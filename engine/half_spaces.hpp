@@ -12,15 +12,16 @@ namespace vnreg::detail {
 
 using kernels::Index;
 
-/// Directions over the sphere, 20 degrees apart. A multiple of the SIMD width.
+/// Directions over the sphere, 20 degrees apart. A multiple of two packets.
 inline constexpr Index half_space_directions = 96;
+/// Enough points to see where a surface ends.
+inline constexpr Index most_extent_points = 512;
 
 using Extents = std::array<float, static_cast<std::size_t>(half_space_directions)>;
 
 /// Along each direction, the extent beyond which few of the points lie (1 in 80: outliers and noise
-/// should not move it). `projections`: room for `count` numbers.
-void measure_extents(const kernels::Coordinates& points, Index count, float* projections,
-                     Extents& extents) noexcept;
+/// should not move it). `count`: 1 to most_extent_points.
+void measure_extents(const kernels::Coordinates& points, Index count, Extents& extents) noexcept;
 
 /// A half-space that the cloud does not reach into, and how many of some points lie in it.
 struct HalfSpace {

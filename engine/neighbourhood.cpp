@@ -9,18 +9,24 @@ using kernels::SpatialIndex;
 
 constexpr Index leaves_per_task = 16;
 
+/// Network `vnreg` takes moments for neighbourhoods: only the spacing is left to find.
 void search_neighbours(const ModelData& model, Workspace& w) noexcept {
+  const bool spacing_only = model.descriptor_model.has_value();
   const auto tasks = [&](Index side) {
     return (w.cloud[side].index.leaves() + leaves_per_task - 1) / leaves_per_task;
   };
   parallel_for_parts(w.threads, w.sides, tasks, [&](Index side, Index task, int thread) {
     Cloud& cloud = w.cloud[side];
+    kernels::NeighbourScratch& scratch = w.scratch[static_cast<std::size_t>(thread)].neighbours;
     const Index first = task * leaves_per_task;
     const Index last = std::min(first + leaves_per_task, cloud.index.leaves());
-    kernels::mean_neighbour_offsets(cloud.index, model.arch.neighbours, first, last,
-                                    w.scratch[static_cast<std::size_t>(thread)].neighbours,
-                                    cloud.offset_x.data(), cloud.offset_y.data(),
-                                    cloud.offset_z.data(), cloud.spacing_squared.data());
+    if (spacing_only) {
+      kernels::nearest_others(cloud.index, first, last, scratch, cloud.spacing_squared.data());
+    } else {
+      kernels::mean_neighbour_offsets(cloud.index, model.arch.neighbours, first, last, scratch,
+                                      cloud.offset_x.data(), cloud.offset_y.data(),
+                                      cloud.offset_z.data(), cloud.spacing_squared.data());
+    }
   });
 }
 

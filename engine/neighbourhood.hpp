@@ -5,7 +5,8 @@
 
 namespace vnreg::detail {
 
-/// Spatial order and k nearest neighbours. Fills cloud.index, offset_*, spacing_squared.
+/// Spatial order and k nearest neighbours. Fills cloud.index, spacing_squared, and for the paper's
+/// encoder offset_*.
 void find_neighbourhoods(const ModelData& model, Workspace& workspace) noexcept;
 
 /// The three edge vectors per point (paper, section III-A): mean_j(x_j) - x_i; x_i;

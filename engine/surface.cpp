@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/workspace.hpp"
+#include "kernels/least_direction.hpp"
 
 namespace vnreg::detail {
 namespace {
@@ -23,8 +24,6 @@ constexpr double line_threshold = 1e-8;
 constexpr double smallest_radius = 1e-30;
 // R.m.s. of a normal distribution, per median of its absolute values.
 constexpr float normal_from_median = 1.4826f;
-// Of the progressive order: enough to see where a surface ends.
-constexpr Index extent_points = 512;
 // The grid is exact out to where the widest comparison ends.
 constexpr float reach_in_spacings = 6.0f;
 
@@ -33,6 +32,14 @@ std::uint32_t reversed(std::uint32_t v, int bits) noexcept {
   std::uint32_t r = 0;
   for (int b = 0; b < bits; ++b) r |= ((v >> b) & 1u) << (bits - 1 - b);
   return r;
+}
+
+/// The place of point i into its record.
+void write_place(Surface& s, Index i) noexcept {
+  float* record = s.records.data() + kernels::oriented_point_size * i;
+  record[0] = s.x[static_cast<std::size_t>(i)];
+  record[1] = s.y[static_cast<std::size_t>(i)];
+  record[2] = s.z[static_cast<std::size_t>(i)];
 }
 
 /// Takes evenly from the spatial order, in bit-reversed order: every prefix is spread evenly.
@@ -49,6 +56,7 @@ void take_points(const Cloud& cloud, float per_radius, Surface& s) noexcept {
     s.x[static_cast<std::size_t>(taken)] = ordered.x[from] * per_radius;
     s.y[static_cast<std::size_t>(taken)] = ordered.y[from] * per_radius;
     s.z[static_cast<std::size_t>(taken)] = ordered.z[from] * per_radius;
+    write_place(s, taken);
     ++taken;
   }
 }
@@ -64,31 +72,68 @@ float median(float* values, Index count) noexcept {
   return *middle;
 }
 
+/// The neighbourhoods of up to as many points as a task fits: what their planes are found from.
+struct Neighbourhoods {
+  static constexpr Index capacity = leaves_per_task * SpatialIndex::leaf_size;
+  /// Sums over the offsets of a point's neighbours.
+  alignas(64) float x[capacity], y[capacity], z[capacity];
+  /// Their covariances, times the number of neighbours.
+  alignas(64) float xx[capacity], xy[capacity], xz[capacity];
+  alignas(64) float yy[capacity], yz[capacity], zz[capacity];
+  alignas(64) float farthest[capacity];  // squared distance
+};
+
+/// The neighbours of a point, as offsets from it; zeros follow the last.
+struct Offsets {
+  alignas(64) float x[neighbour_lanes], y[neighbour_lanes], z[neighbour_lanes];
+
+  Offsets(const Surface& s, Index own) noexcept {
+    std::uint16_t places[neighbour_lanes];
+    std::copy_n(s.neighbours.data() + surface_neighbours * own, surface_neighbours, places);
+    std::fill(places + surface_neighbours, places + neighbour_lanes,
+              static_cast<std::uint16_t>(own));
+    float normals[3][neighbour_lanes];  // which are not there yet
+    kernels::gather_points(s.records.data(), places, neighbour_lanes,
+                           {x, y, z, normals[0], normals[1], normals[2]});
+    const float* centre = s.records.data() + kernels::oriented_point_size * own;
+#pragma omp simd
+    for (Index n = 0; n < neighbour_lanes; ++n) {
+      x[n] -= centre[0];
+      y[n] -= centre[1];
+      z[n] -= centre[2];
+    }
+  }
+};
+
+/// Neighbourhood `i` is that of point `own`.
+void measure_neighbourhood(const Surface& s, Index own, Index i, Neighbourhoods& out) noexcept {
+  using Lanes = Eigen::Map<const Eigen::Array<float, neighbour_lanes, 1>, Eigen::Aligned64>;
+  const Offsets offsets(s, own);
+  const Lanes x(offsets.x), y(offsets.y), z(offsets.z);
+  constexpr float share = 1.0f / static_cast<float>(surface_neighbours);
+  const float sx = x.sum(), sy = y.sum(), sz = z.sum();
+  out.x[i] = sx;
+  out.y[i] = sy;
+  out.z[i] = sz;
+  out.xx[i] = x.square().sum() - share * sx * sx;
+  out.xy[i] = (x * y).sum() - share * sx * sy;
+  out.xz[i] = (x * z).sum() - share * sx * sz;
+  out.yy[i] = y.square().sum() - share * sy * sy;
+  out.yz[i] = (y * z).sum() - share * sy * sz;
+  out.zz[i] = z.square().sum() - share * sz * sz;
+  out.farthest[i] = (x.square() + y.square() + z.square()).maxCoeff();
+}
+
 /// The direction in which the point's neighbours vary least, and the point's place in the plane
 /// across it through their centroid.
-void fit_plane(Index i, Surface& s) noexcept {
-  const auto own = static_cast<std::size_t>(i);
-  const std::uint16_t* neighbours = s.neighbours.data() + surface_neighbours * i;
-  const Eigen::Vector3d centre = point_at(s, own);
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-  double farthest = 0;
-  for (Index n = 0; n < surface_neighbours; ++n) {
-    const Eigen::Vector3d offset = point_at(s, neighbours[n]) - centre;
-    sum += offset;
-    squares += offset * offset.transpose();
-    farthest = std::max(farthest, offset.squaredNorm());
-  }
-  const Eigen::Matrix3d covariance =
-      squares - sum * sum.transpose() / static_cast<double>(surface_neighbours);
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-  solver.computeDirect(covariance);
-  const Eigen::Vector3f normal = solver.eigenvectors().col(0).cast<float>();
+void write_plane(const Neighbourhoods& n, Index i, const Eigen::Vector3f& normal, std::size_t own,
+                 Surface& s) noexcept {
   s.normal_x[own] = normal.x();
   s.normal_y[own] = normal.y();
   s.normal_z[own] = normal.z();
-  s.spread_squared[own] = static_cast<float>(farthest);
-  const Eigen::Vector3f centroid = (sum / static_cast<double>(surface_neighbours)).cast<float>();
+  s.spread_squared[own] = n.farthest[i];
+  const Eigen::Vector3f centroid =
+      Eigen::Vector3f(n.x[i], n.y[i], n.z[i]) / static_cast<float>(surface_neighbours);
   const float height = -normal.dot(centroid);
   s.height[own] = std::abs(height);
   s.flat_x[own] = s.x[own] - height * normal.x();
@@ -96,12 +141,29 @@ void fit_plane(Index i, Surface& s) noexcept {
   s.flat_z[own] = s.z[own] - height * normal.z();
 }
 
+void fit_planes(Surface& s, Index first_leaf, Index last_leaf,
+                kernels::NeighbourScratch& scratch) noexcept {
+  kernels::nearest_points(s.index, surface_neighbours, first_leaf, last_leaf, scratch,
+                          s.neighbours.data());
+  const Index first = first_leaf * SpatialIndex::leaf_size;
+  const Index count = std::min(last_leaf * SpatialIndex::leaf_size, s.count) - first;
+  const std::uint32_t* points = s.index.original() + first;
+  Neighbourhoods n;
+  for (Index i = 0; i < count; ++i) measure_neighbourhood(s, Index{points[i]}, i, n);
+  alignas(64) float x[Neighbourhoods::capacity], y[Neighbourhoods::capacity],
+      z[Neighbourhoods::capacity];
+  kernels::least_directions({n.xx, n.xy, n.xz, n.yy, n.yz, n.zz}, count, x, y, z);
+  for (Index i = 0; i < count; ++i) write_plane(n, i, {x[i], y[i], z[i]}, points[i], s);
+}
+
 /// What matches are looked up in: the records of the points and the places of their neighbours.
 void write_lookups(Surface& s) noexcept {
-  const kernels::Floats* numbers[6] = {&s.x, &s.y, &s.z, &s.normal_x, &s.normal_y, &s.normal_z};
   for (std::size_t i = 0; i < static_cast<std::size_t>(s.count); ++i) {
+    write_place(s, static_cast<Index>(i));
     float* record = s.records.data() + kernels::oriented_point_size * static_cast<Index>(i);
-    for (std::size_t k = 0; k < 6; ++k) record[k] = (*numbers[k])[i];
+    record[3] = s.normal_x[i];
+    record[4] = s.normal_y[i];
+    record[5] = s.normal_z[i];
     const std::uint16_t* neighbours =
         s.neighbours.data() + surface_neighbours * static_cast<Index>(i);
     float* places = s.neighbour_places.data() + 3 * neighbour_lanes * static_cast<Index>(i);
@@ -122,17 +184,7 @@ void flatten(Surface& s) noexcept {
   std::swap(s.y, s.flat_y);
   std::swap(s.z, s.flat_z);
   write_lookups(s);
-  measure_extents(s.coordinates(), std::min(s.count, extent_points), s.height.data(), s.extents);
-}
-
-void fit_planes(Surface& s, Index first_leaf, Index last_leaf,
-                kernels::NeighbourScratch& scratch) noexcept {
-  kernels::nearest_points(s.index, surface_neighbours, first_leaf, last_leaf, scratch,
-                          s.neighbours.data());
-  const Index last = std::min(last_leaf * SpatialIndex::leaf_size, s.count);
-  for (Index p = first_leaf * SpatialIndex::leaf_size; p < last; ++p) {
-    fit_plane(static_cast<Index>(s.index.original()[p]), s);
-  }
+  measure_extents(s.coordinates(), std::min(s.count, most_extent_points), s.extents);
 }
 
 bool is_line(const Surface& s) noexcept {

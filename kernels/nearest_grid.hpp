@@ -19,15 +19,18 @@ class NearestGrid {
  public:
   /// Cells along the longest side of the box. A multiple of `block`.
   static constexpr Index cells = 28;
-  /// Cells along the sides of the cubes that share one search.
+  /// Cells along the sides of the cubes that share a search for what may be nearest.
   static constexpr Index block = 4;
+  /// Cells along the sides of a part of a block: of a packet's size.
+  static constexpr Index part = 2;
 
   /// Allocates for clouds of at most 65,536 points.
   void allocate() { nearest_.resize(static_cast<std::size_t>(cells * cells * cells)); }
 
   /// Lays cubic cells over the bounding box of the points, widened by `margin` (positive) on all
-  /// sides. Within a block whose cells' centres are all farther than `reach` from every point, all
-  /// cells hold the point nearest to the block's centre: the bound above then does not hold.
+  /// sides. Within a block, or a part of it, whose cells' centres are all farther than `reach` from
+  /// every point, all cells hold the point nearest to its centre: the bound above then does not
+  /// hold.
   void place(const SpatialIndex& index, float margin, float reach) noexcept;
   /// Searches for the cells of the blocks [first, last) of blocks(). Blocks are independent.
   void fill(const SpatialIndex& index, Index first, Index last, NeighbourScratch& scratch) noexcept;
@@ -45,6 +48,15 @@ class NearestGrid {
   void nearest(const Coordinates& queries, Index count, std::uint16_t* places) const noexcept;
 
  private:
+  void fill_block(const SpatialIndex& index, const Index corner[3],
+                  NeighbourScratch& scratch) noexcept;
+  void fill_part(const NeighbourScratch& candidates, Index count, const Index corner[3],
+                 float* squared) noexcept;
+  void store(const Index corner[3], Index side, const std::int32_t* points, Index step) noexcept;
+  float centre(int axis, Index cell) const noexcept {
+    return low_[axis] + (static_cast<float>(cell) + 0.5f) * size_;
+  }
+
   std::int32_t cell_of(float x, float y, float z) const noexcept {
     return (place_along(2, z) * rows_ + place_along(1, y)) * columns_ + place_along(0, x);
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "kernels/list_within.hpp"
+
 namespace vnreg::kernels {
 namespace {
 
@@ -177,6 +179,27 @@ float nearest_other(std::int32_t own, Index count, const NeighbourScratch& s) no
   return nearest;
 }
 
+/// nearest[i] = the smallest squared distance from point i of a leaf to a point of `offered`, or to
+/// itself in `nearest`; no point is offered to itself.
+void offer_leaf(const SpatialIndex& index, Index offered, Index leaf, float* nearest) noexcept {
+  const Coordinates points = index.ordered();
+  const float* x = points.x + leaf * leaf_size;
+  const float* y = points.y + leaf * leaf_size;
+  const float* z = points.z + leaf * leaf_size;
+  const Index first = offered * leaf_size;
+  const Index count = std::min(leaf_size, index.count() - first);
+  for (Index j = 0; j < count; ++j) {
+    const Point p = point_at(points, first + j);
+    const auto self = static_cast<std::int32_t>(offered == leaf ? j : leaf_size);
+#pragma omp simd
+    for (std::int32_t i = 0; i < leaf_size; ++i) {
+      const float dx = x[i] - p.x, dy = y[i] - p.y, dz = z[i] - p.z;
+      const float squared = i == self ? infinity : (dx * dx + dy * dy) + dz * dz;
+      nearest[i] = squared < nearest[i] ? squared : nearest[i];
+    }
+  }
+}
+
 }  // namespace
 
 NeighbourScratch::NeighbourScratch(Index max_points) {
@@ -206,17 +229,34 @@ void mean_neighbour_offsets(const SpatialIndex& index, Index k, Index first_leaf
 
 void nearest_points(const SpatialIndex& index, Index k, Index first_leaf, Index last_leaf,
                     NeighbourScratch& scratch, std::uint16_t* neighbours) noexcept {
-  for_each_neighbourhood(index, k, first_leaf, last_leaf, scratch,
-                         [&](Index i, Index count, const Selection& nearest) {
-                           std::uint16_t* out = neighbours + k * Index{index.original()[i]};
-                           for (Index c = 0; c < count; ++c) {
-                             const float squared = scratch.squared[static_cast<std::size_t>(c)];
-                             const std::int32_t at = scratch.original[static_cast<std::size_t>(c)];
-                             if (squared > nearest.limit) continue;
-                             if (squared == nearest.limit && at > nearest.last_tied) continue;
-                             *out++ = static_cast<std::uint16_t>(at);
-                           }
-                         });
+  for_each_neighbourhood(
+      index, k, first_leaf, last_leaf, scratch,
+      [&](Index i, Index count, const Selection& nearest) {
+        std::uint16_t* out = neighbours + k * Index{index.original()[i]};
+        for_each_within(scratch.squared.data(), count, nearest.limit, [&](Index c) {
+          const std::int32_t at = scratch.original[static_cast<std::size_t>(c)];
+          const bool tied = scratch.squared[static_cast<std::size_t>(c)] == nearest.limit;
+          if (!tied || at <= nearest.last_tied) *out++ = static_cast<std::uint16_t>(at);
+        });
+      });
+}
+
+void nearest_others(const SpatialIndex& index, Index first_leaf, Index last_leaf,
+                    NeighbourScratch& scratch, float* squared) noexcept {
+  float* bounds = scratch.bounds.data();
+  for (Index leaf = first_leaf; leaf < last_leaf; ++leaf) {
+    alignas(64) float nearest[leaf_size];
+    std::fill_n(nearest, leaf_size, infinity);
+    offer_leaf(index, leaf, leaf, nearest);
+    const Index first = leaf * leaf_size;
+    const Index count = std::min(leaf_size, index.count() - first);
+    const float limit = *std::max_element(nearest, nearest + count);
+    index.box_bounds(index.box(leaf), bounds, scratch.far_bounds.data());
+    for (Index other = 0; other < index.leaves(); ++other) {
+      if (bounds[other] <= limit && other != leaf) offer_leaf(index, other, leaf, nearest);
+    }
+    for (Index i = 0; i < count; ++i) squared[index.original()[first + i]] = nearest[i];
+  }
 }
 
 void nearest_distances(const SpatialIndex& index, const Coordinates& queries, Index count,

@@ -34,6 +34,11 @@ void mean_neighbour_offsets(const SpatialIndex& index, Index k, Index first_leaf
 void nearest_points(const SpatialIndex& index, Index k, Index first_leaf, Index last_leaf,
                     NeighbourScratch& scratch, std::uint16_t* neighbours) noexcept;
 
+/// squared[i] = squared distance from input point i of those leaves to the nearest other point,
+/// infinite when there is none.
+void nearest_others(const SpatialIndex& index, Index first_leaf, Index last_leaf,
+                    NeighbourScratch& scratch, float* squared) noexcept;
+
 /// squared[i] = squared distance from query i to the nearest point of the index. Fast when
 /// consecutive queries are near each other, as in the order of another index.
 void nearest_distances(const SpatialIndex& index, const Coordinates& queries, Index count,

@@ -33,9 +33,8 @@ struct Axes {
 
 Extents extents_of(const Points& points) {
   const Axes axes(points);
-  std::vector<float> projections(points.size());
   Extents extents;
-  detail::measure_extents(axes.coordinates(), axes.count(), projections.data(), extents);
+  detail::measure_extents(axes.coordinates(), axes.count(), extents);
   return extents;
 }
 

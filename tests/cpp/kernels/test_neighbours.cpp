@@ -75,7 +75,10 @@ void check_neighbours(const PointSet& points, Index k) {
                          spacing.data());
   mean_neighbour_offsets(index, k, half, index.leaves(), scratch, dx.data(), dy.data(), dz.data(),
                          spacing.data());
-  REQUIRE((dx.intact() && dy.intact() && dz.intact() && spacing.intact()));
+  GuardedFloats alone(count);
+  nearest_others(index, 0, half, scratch, alone.data());
+  nearest_others(index, half, index.leaves(), scratch, alone.data());
+  REQUIRE((dx.intact() && dy.intact() && dz.intact() && spacing.intact() && alone.intact()));
   float extent = 0;
   for (Index i = 0; i < count; ++i) {
     extent = std::max({extent, std::abs(points.x[static_cast<std::size_t>(i)]),
@@ -97,7 +100,9 @@ void check_neighbours(const PointSet& points, Index k) {
     REQUIRE(std::abs(static_cast<double>(dx.data()[i]) - mean[0]) <= tolerance);
     REQUIRE(std::abs(static_cast<double>(dy.data()[i]) - mean[1]) <= tolerance);
     REQUIRE(std::abs(static_cast<double>(dz.data()[i]) - mean[2]) <= tolerance);
-    REQUIRE(spacing.data()[i] == reference::spacing_squared(points.coordinates(), count, i));
+    const float expected = reference::spacing_squared(points.coordinates(), count, i);
+    REQUIRE(spacing.data()[i] == expected);
+    REQUIRE(alone.data()[i] == expected);
   }
 }
 
