@@ -9,6 +9,7 @@
 #include <string>
 
 #include "clouds.hpp"
+#include "context.hpp"
 #include "random_model.hpp"
 
 namespace vnreg::bench {
@@ -67,9 +68,7 @@ int main(int argc, char** argv) {
   }
   bench::add("paper", bench::random_paper_model(128, 64), Mode::paper, 1024);
   bench::add("width48", bench::random_paper_model(48, 32), Mode::paper, 1024);
-  benchmark::AddCustomContext("vnreg", std::string(version()));
-  benchmark::AddCustomContext("instruction set", std::string(instruction_set()));
-  benchmark::AddCustomContext("compiler", VNREG_COMPILER ", " VNREG_BUILD_TYPE);
+  bench::add_context();
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   benchmark::RunSpecifiedBenchmarks();

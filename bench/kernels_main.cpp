@@ -7,15 +7,13 @@
 // be faster); the label names what bounds the benchmark there.
 #include <benchmark/benchmark.h>
 
+#include "context.hpp"
 #include "roofline.hpp"
-#include "vnreg/vnreg.hpp"
 
 int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-  benchmark::AddCustomContext("vnreg", std::string(vnreg::version()));
-  benchmark::AddCustomContext("compiler", VNREG_COMPILER ", " VNREG_BUILD_TYPE);
-  benchmark::AddCustomContext("instruction set", std::string(vnreg::instruction_set()));
+  vnreg::bench::add_context();
   vnreg::bench::register_roofline();
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();

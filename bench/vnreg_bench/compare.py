@@ -47,7 +47,9 @@ def compare_commits(base: str, other: str | None, rounds: int, chosen: str) -> i
     rows = compare_rounds(*times)
     alone = sorted(set(times[0]) ^ set(times[1]))
     name = other or "this tree"
-    print(f"{cpu_field('model name')}: {name} / {base}, {rounds} rounds in turns\n")
+    built = ", ".join(build_words(build) for build in builds)
+    print(f"{cpu_field('model name')}; {built}")
+    print(f"{name} / {base}, {rounds} rounds in turns\n")
     print(comparison_table(rows))
     if alone:
         print(f"\nOnly in one of both: {', '.join(alone)}")
@@ -88,6 +90,16 @@ def build_tree(tree: Path, build: Path) -> Path:
     compile_all = ["cmake", "--build", str(build), "--target", *PROGRAMS]
     subprocess.run(compile_all, check=True, stdout=subprocess.DEVNULL, env=environment)
     return build
+
+
+def build_words(build: Path) -> str:
+    """Instruction set and compiler of a build, as its cache says."""
+    cache = (build / "CMakeCache.txt").read_text(encoding="utf-8").splitlines()
+    values = dict(line.split("=", 1) for line in cache if "=" in line)
+    found = {name.split(":")[0]: value for name, value in values.items()}
+    isa, compiler = found.get("VNREG_ISA", "?"), found["CMAKE_CXX_COMPILER"]
+    number = subprocess.run([compiler, "-dumpfullversion"], capture_output=True, text=True)
+    return f"{build.name}: {isa}, {Path(compiler).name} {number.stdout.strip()}"
 
 
 def run_rounds(base: Path, other: Path, rounds: int, chosen: str) -> tuple[Rounds, Rounds]:

@@ -52,8 +52,8 @@ def how_measured(report: Report) -> str:
             f"{', '.join(about['extensions'])}; {caches}; {about['system']}.",
             f"- **Engine**: vnreg {about['vnreg']}, build {about['instruction_set']}, "
             f"{kernels.get('compiler', 'compiler not recorded')}.",
-            f"- **Peers**: Python {about['python']}, {packages}. TEASER++ is not among them: it has"
-            " no package that installs on this Python.",
+            f"- **Peers**: Python {about['python']}, {packages}. TEASER++ is not among them: its "
+            "package (cmeel-teaser-plusplus) fetches further sources while it builds.",
             "- **Run**: times are medians of rounds that call everything in turns. Every process is"
             " pinned to as many processors as it has threads; one thread unless the table says "
             "otherwise. The last table says when, at which commit and beside what load each part "
