@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
 import torch
+from onnx.reference import ReferenceEvaluator
 from vnreg_bench.contest import EQUAL, Worker, largest_error, normalised_error
 from vnreg_bench.inputs import bent_box, random_paper_model
 from vnreg_bench.runtimes import Task, engine, engine_stages, torch_eager
@@ -38,7 +40,6 @@ def task(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
         random_paper_model(model, 12, POINTS)
     else:
         random_descriptor_model(model)
-    pytest.importorskip("onnxscript", reason="requirements/bench.txt is not installed")
     export_onnx(load_encoder(model, POINTS), onnx, POINTS)
     clouds = bent_box(POINTS)
     return Task(model, onnx, clouds, engine_stages(model, clouds)[0], threads=1)
@@ -52,9 +53,7 @@ def test_torch_computes_what_the_engine_does(task: Task) -> None:
 
 
 def test_the_onnx_file_gives_the_same(task: Task) -> None:
-    reference = pytest.importorskip("onnx.reference")
-    onnx = pytest.importorskip("onnx")
-    evaluator = reference.ReferenceEvaluator(onnx.load(task.onnx))
+    evaluator = ReferenceEvaluator(onnx.load(task.onnx))
     outputs = dict(zip(evaluator.output_names, evaluator.run(None, task.inputs), strict=True))
     assert largest_error(outputs, engine_stages(task.model, task.clouds)[1]) < EQUAL
 
