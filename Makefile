@@ -14,7 +14,7 @@ PEERS_DEBIAN := libusb-1.0-0 libgl1 libegl1 libidn2-0
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python check sanitize \
-        bench bench-compare evaluate train train-paper data model clean
+        bench bench-compare evaluate train train-paper data model docs clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -99,6 +99,9 @@ bench: python build $(VENV)/.bench ## times of kernels, engine, peers, runtimes,
 bench-compare: python ## this tree's benchmarks beside those of BASE=<commit>; fails where one is slower
 	@test -n "$(BASE)" || { echo "usage: make bench-compare BASE=<commit>"; exit 2; }
 	$(BENCH) compare $(BASE) $(COMPARE_ARGS)
+
+docs: python ## the documentation site, at build/site/index.html
+	$(PY) -m mkdocs build -q
 
 clean:
 	rm -rf build

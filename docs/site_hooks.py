@@ -1,0 +1,82 @@
+"""What MkDocs cannot do by itself: pages that are made of files elsewhere in the repository.
+
+A line `{{ file PATH }}` becomes the content of a Markdown file, `{{ code LANGUAGE PATH }}` that of
+a source file as code, `{{ module vnreg }}` the documentation of the Python module.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import re
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+OUTSIDE = re.compile(r"\]\((?:\.\./)+([^)#]*)(#[^)]*)?\)")
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Called by MkDocs with the text of every page."""
+    text = re.sub(r"^\{\{ (\w+) (.+?) \}\}$", _replacement, markdown, flags=re.M)
+    # What lies outside of docs/ is not on the site: named, not linked.
+    return OUTSIDE.sub("] (`\\1`)", text).replace("[] (", "(")
+
+
+def _replacement(match: re.Match[str]) -> str:
+    kind, argument = match[1], match[2]
+    if kind == "file":
+        return (ROOT / argument).read_text(encoding="utf-8")
+    if kind == "code":
+        language, path = argument.split()
+        return f"```{language}\n{(ROOT / path).read_text(encoding='utf-8')}```"
+    if kind == "module":
+        return module_reference(importlib.import_module(argument))
+    raise ValueError(f"unknown instruction: {match[0]}")
+
+
+def module_reference(module: ModuleType) -> str:
+    """Every public name of the module, its signature from the type stub, and its docstring."""
+    stub = _stub_signatures(Path(str(module.__file__)).with_name("_vnreg.pyi"))
+    parts = [inspect.getdoc(module) or ""]
+    for name in module.__all__:
+        thing = getattr(module, name)
+        if name == "__version__":
+            continue
+        parts += [f"## {name}", _signature(stub, name), _text(thing)]
+        for member in vars(thing) if isinstance(thing, type) else ():
+            if not member.startswith("_"):
+                key = f"{name}.{member}"
+                parts += [f"### {key}", _signature(stub, key), _text(getattr(thing, member))]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _text(thing: Any) -> str:
+    """A docstring without the signatures that nanobind puts in front, as preformatted text."""
+    doc = inspect.getdoc(thing) or ""
+    doc = re.sub(r"\A(?:\w+\(.*\n+)+", "", doc)
+    return f"<pre>{_escaped(doc)}</pre>" if doc else ""
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def _signature(stub: dict[str, str], key: str) -> str:
+    text = stub.get(f"{key}.__init__", stub.get(key, ""))
+    return f"```python\n{text}\n```" if text else ""
+
+
+def _stub_signatures(path: Path) -> dict[str, str]:
+    """{"align": "def align(...) -> Result", "Model.load": ...} of the type stub."""
+
+    signatures: dict[str, str] = {}
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        members = node.body if isinstance(node, ast.ClassDef) else [node]
+        prefix = f"{node.name}." if isinstance(node, ast.ClassDef) else ""
+        for member in members:
+            if isinstance(member, ast.FunctionDef):
+                signatures[prefix + member.name] = ast.unparse(member).removesuffix(": ...")
+    return signatures
