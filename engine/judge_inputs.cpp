@@ -243,6 +243,7 @@ void choose_judged_points(Workspace& w) noexcept {
     set_log_sums(side == 0 ? v.match.row_sum : v.match.column_sum, d.count, v.match.largest, c);
     float* bounds = v.judge.scratch[static_cast<std::size_t>(thread)].leaf_bounds.data();
     for (std::size_t i = 0; i < static_cast<std::size_t>(c.points.count); ++i) {
+      if (i % 16 == 0 && w.deadline.passed()) return;
       const float place[3] = {c.points.x[i], c.points.y[i], c.points.z[i]};
       kernels::surroundings(s.index, place, radii, bounds, c.own[i]);
     }

@@ -228,8 +228,10 @@ Index propose_from_matches(Workspace& w) noexcept {
   const CloudDescriptors& source = w.descriptors.features[0].out;
   const CloudDescriptors& target = w.descriptors.features[1].out;
   compare_descriptors(source, target, b);
+  if (w.deadline.passed()) return 0;
   select_matches(source, target, b);
   gather_places(source, target, b);
+  if (w.deadline.passed()) return 0;
   Index count = 0;
   const auto add = [&](kernels::RigidTransform pose) {
     pose.translation /= v.radius;
@@ -244,9 +246,10 @@ Index propose_from_matches(Workspace& w) noexcept {
       add(pose);
     }
   }
+  if (w.deadline.passed()) return 0;
   measure_agreement(b);
   const Index seeds = select_seeds(b);
-  for (Index i = 0; i < seeds; ++i) {
+  for (Index i = 0; i < seeds && !w.deadline.passed(); ++i) {
     if (pose_of_group(b.seeds[static_cast<std::size_t>(i)], b, pose)) add(pose);
   }
   return count;

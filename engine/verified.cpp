@@ -238,7 +238,9 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
   const double least =
       count > 0 ? poses[0].score - gaps_below(poses[0].score, result.judged).alternative : 0;
   for (Index i = 0; i < count && poses[i].score >= least; ++i) {
-    poses[i].transform = refine(poses[i].transform, v.surface, scaled(polish, v.spacing));
+    if (!w.deadline.passed()) {
+      poses[i].transform = refine(poses[i].transform, v.surface, scaled(polish, v.spacing));
+    }
     result.pose[result.count++] = {in_units(orthonormal(poses[i].transform), v.radius),
                                    poses[i].score};
   }
