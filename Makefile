@@ -14,7 +14,7 @@ PEERS_DEBIAN := libusb-1.0-0 libgl1 libegl1 libidn2-0
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python check sanitize \
-        bench bench-compare evaluate train train-paper data model docs clean
+        bench bench-compare evaluate train train-paper data model docs wheel clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -37,8 +37,9 @@ build: debian-packages ## the library and the program, at build/release/vnreg
 	cmake --preset $(PRESET) > /dev/null
 	cmake --build --preset $(PRESET)
 
-python: setup ## the Python module `vnreg`, into .venv
-	$(PY) -m pip install -q --no-build-isolation .
+python: setup ## the Python module `vnreg` for x86-64-v3 into .venv; `make wheel` is for all
+	$(PY) -m pip install -q --no-build-isolation -C cmake.define.VNREG_HWCAPS=OFF \
+	  -C cmake.define.VNREG_ISA=x86-64-v3 .
 
 demo: python build ## align two real scans, print the pose, draw before and after
 	$(PY) examples/demo/demo.py --check
@@ -99,6 +100,11 @@ bench: python build $(VENV)/.bench ## times of kernels, engine, peers, runtimes,
 bench-compare: python ## this tree's benchmarks beside those of BASE=<commit>; fails where one is slower
 	@test -n "$(BASE)" || { echo "usage: make bench-compare BASE=<commit>"; exit 2; }
 	$(BENCH) compare $(BASE) $(COMPARE_ARGS)
+
+wheel: setup ## the wheel with its three builds, in build/wheel, and its check in a clean environment
+	rm -rf build/wheel
+	$(PY) -m pip wheel -q --no-build-isolation --no-deps -w build/wheel .
+	tests/wheel/check_wheel.sh build/wheel/*.whl build/wheel/check
 
 docs: python ## the documentation site, at build/site/index.html
 	$(PY) -m mkdocs build -q

@@ -14,6 +14,9 @@ foreach(kind shared static)
       DESTINATION "${cmake_dir}" COMPONENT development)
   endif()
 endforeach()
+if(VNREG_HWCAPS)
+  vnreg_install_hwcaps(${CMAKE_INSTALL_LIBDIR} runtime)
+endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/engine/include/vnreg TYPE INCLUDE COMPONENT development)
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/vnregConfig.cmake.in vnregConfig.cmake

@@ -18,6 +18,15 @@ ROOT = Path(__file__).resolve().parents[1]
 OUTSIDE = re.compile(r"\]\((?:\.\./)+([^)#]*)(#[^)]*)?\)")
 
 
+def on_config(config: Any) -> Any:
+    """Called by MkDocs with its configuration: pages that it does not list go to the end."""
+    listed = set(re.findall(r"\w+\.md", str(config.nav)))
+    for path in sorted(Path(config.docs_dir).glob("*.md")):
+        if path.name not in listed:
+            config.nav.append({path.stem.replace("_", " ").capitalize(): path.name})
+    return config
+
+
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Called by MkDocs with the text of every page."""
     text = re.sub(r"^\{\{ (\w+) (.+?) \}\}$", _replacement, markdown, flags=re.M)

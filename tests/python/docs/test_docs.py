@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-import yaml
 
 import vnreg
 
@@ -150,11 +149,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_page_of_the_site_is_there_and_every_page_is_on_it(site: Path) -> None:
-    text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
-    pages = set(re.findall(r"[\w/]+\.md", str(yaml.safe_load(text)["nav"])))
-    assert pages == {path.name for path in DOCS.glob("*.md")}
-    for page in pages:
-        assert (site / page).with_suffix(".html").stat().st_size > 2000
+    home = (site / "index.html").read_text(encoding="utf-8")
+    for page in DOCS.glob("*.md"):
+        name = page.with_suffix(".html").name
+        assert (site / name).stat().st_size > 2000
+        assert f'href="{name}"' in home or name == "index.html"
 
 
 def test_the_reference_tells_every_public_name(site: Path) -> None:
