@@ -10,6 +10,12 @@ from vnreg_bench.peers import LOCAL
 from vnreg_train.evaluate.report import TITLES, table
 
 Report = Mapping[str, Any]
+# What a part's medians are over, where it is not rounds: the name of the setting.
+RUNS = {
+    "kernels": "kernel_repetitions",
+    "latency": "latency_pairs",
+    "peers": "peer_shapes",
+}
 
 
 def markdown(report: Report, plots: Mapping[str, str], folder: str = "benchmark") -> str:
@@ -57,7 +63,8 @@ def how_measured(report: Report) -> str:
             "- **Run**: times are medians of rounds that call everything in turns. Every process is"
             " pinned to as many processors as it has threads; one thread unless the table says "
             "otherwise. The last table says when, at which commit and beside what load each part "
-            "was measured.",
+            "was measured. Priority *real-time*: the benchmark came before all other programs on "
+            "its processors; what those did to shared caches, memory and clock is in the figures.",
         ]
     )
 
@@ -75,13 +82,13 @@ def parts_table(report: Report) -> str:
                     about["date"],
                     f"`{about['commit']}`",
                     f"{about['minutes']:.1f}",
-                    str(settings["rounds"]),
+                    f"{settings[RUNS.get(name, 'rounds')]:,}",
                     " – ".join(f"{load:.1f}" for load in about["load"]),
                     "real-time" if about["real_time"] else "ordinary",
                 )
             )
     return table(
-        ("part", "date", "commit", "minutes", "rounds", "load before – after", "priority"), lines
+        ("part", "date", "commit", "minutes", "runs", "load before – after", "priority"), lines
     )
 
 

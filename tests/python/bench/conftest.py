@@ -78,7 +78,12 @@ def report() -> dict[str, Any]:
         "minutes": 1.5,
         "load": [0.0, 1.0],
         "real_time": False,
-        "settings": {"rounds": 9},
+        "settings": {
+            "rounds": 9,
+            "kernel_repetitions": 3,
+            "latency_pairs": 500,
+            "peer_shapes": 82,
+        },
     }
     machine = {
         "cpu": "A processor",
