@@ -37,9 +37,8 @@ build: debian-packages ## the library and the program, at build/release/vnreg
 	cmake --preset $(PRESET) > /dev/null
 	cmake --build --preset $(PRESET)
 
-python: setup ## the Python module `vnreg` for x86-64-v3 into .venv; `make wheel` is for all
-	$(PY) -m pip install -q --no-build-isolation -C cmake.define.VNREG_HWCAPS=OFF \
-	  -C cmake.define.VNREG_ISA=x86-64-v3 .
+python: setup ## the Python module `vnreg`, into .venv
+	$(PY) -m pip install -q --no-build-isolation .
 
 demo: python build ## align two real scans, print the pose, draw before and after
 	$(PY) examples/demo/demo.py --check
@@ -103,7 +102,8 @@ bench-compare: python ## this tree's benchmarks beside those of BASE=<commit>; f
 
 wheel: setup ## the wheel with its three builds, in build/wheel, and its check in a clean environment
 	rm -rf build/wheel
-	$(PY) -m pip wheel -q --no-build-isolation --no-deps -w build/wheel .
+	$(PY) -m pip wheel -q --no-build-isolation --no-deps -w build/wheel -C build-dir=build/wheel-build \
+	  -C cmake.define.VNREG_HWCAPS=ON -C cmake.define.VNREG_ISA=x86-64-v2 .
 	tests/wheel/check_wheel.sh build/wheel/*.whl build/wheel/check
 
 docs: python ## the documentation site, at build/site/index.html
