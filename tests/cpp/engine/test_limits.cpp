@@ -1,6 +1,8 @@
 // A call ends when its time is up or when it is told to.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <limits>
 #include <thread>
 
 #include "clouds.hpp"
@@ -33,21 +35,26 @@ TEST_CASE_METHOD(Clouds, "enough time changes nothing") {
 TEST_CASE_METHOD(Clouds, "whatever the budget, a status and no pose or a rigid one") {
   for (const int threads : {1, 2}) {
     const Model model = Model::builtin();
-    Result whole = Registrar(model, {.threads = threads}).align(source, target);
-    int timed_out = 0, with_pose = 0;
-    for (double share = 0.02; share < 0.97; share += 0.05) {
-      Registrar registrar(model, {.threads = threads, .time_budget_ms = share * whole.ms.total});
-      for (int repeat = 0; repeat < 2; ++repeat) {
-        const Result& result = registrar.align(source, target);
-        CAPTURE(share, threads, to_string(result.status), result.ms.total);
-        if (result.status != Status::timed_out) continue;
-        ++timed_out;
-        with_pose += result.has_pose;
-        REQUIRE((!result.has_pose || is_rigid(result.T_target_source)));
-        REQUIRE(std::isnan(result.confidence));
-        REQUIRE(std::isnan(result.covariance[0]));
-      }
+    Registrar unlimited(model, {.threads = threads});
+    double whole_ms = std::numeric_limits<double>::infinity();  // undisturbed, and warm
+    for (int i = 0; i < 10; ++i) {
+      whole_ms = std::min(whole_ms, unlimited.align(source, target).ms.total);
     }
+    int timed_out = 0, with_pose = 0;
+    const auto align_within = [&](double share) {
+      Registrar registrar(model, {.threads = threads, .time_budget_ms = share * whole_ms});
+      const Result& result = registrar.align(source, target);
+      CAPTURE(share, threads, to_string(result.status), result.ms.total);
+      if (result.status != Status::timed_out) return;
+      ++timed_out;
+      with_pose += result.has_pose;
+      REQUIRE((!result.has_pose || is_rigid(result.T_target_source)));
+      REQUIRE(std::isnan(result.confidence));
+      REQUIRE(std::isnan(result.covariance[0]));
+    };
+    for (double share = 0.02; share < 0.97; share += 0.025) align_within(share);
+    // Poses come late; how late, on a busy machine, differs from call to call.
+    for (int i = 0; i < 500 && with_pose == 0; ++i) align_within(0.6 + 0.01 * (i % 60));
     REQUIRE(timed_out > 10);
     REQUIRE(with_pose > 0);
   }

@@ -121,7 +121,7 @@ TEST_CASE("ambiguous is a second pose that scores nearly as much as the first") 
   REQUIRE(detail::ambiguous(poses));
 }
 
-TEST_CASE("alternatives are the lesser poses: sorted, far from each other, at least 80 percent") {
+TEST_CASE("alternatives are the lesser poses: sorted, far from each other, at most 4 less") {
   Random random(253);
   Registrar registrar(shipped_model(), {.threads = 1});
   for (int trial = 0; trial < 3; ++trial) {
@@ -134,7 +134,7 @@ TEST_CASE("alternatives are the lesser poses: sorted, far from each other, at le
     for (const Alternative& alternative : result.alternatives) {
       CAPTURE(trial, alternative.score);
       REQUIRE(alternative.score <= previous);
-      REQUIRE(alternative.score >= 0.8 * result.score);
+      REQUIRE(alternative.score >= result.score - 4.0);
       const Eigen::Isometry3d pose = motion_of(alternative.T_target_source);
       for (const Pose& other : known) {
         const Eigen::Isometry3d before = motion_of(other);
