@@ -47,8 +47,7 @@ int main(void) {
     fprintf(stderr, "%s\n", error.message);
     return 1;
   }
-  printf("%s %s: %s\n", vnreg_version(), vnreg_instruction_set(),
-         vnreg_status_name(result.status));
+  printf("%s %s: %s\n", vnreg_version(), vnreg_instruction_set(), vnreg_status_name(result.status));
   vnreg_prepared_free(prepared);
   vnreg_registrar_free(registrar);
   vnreg_model_free(model);
