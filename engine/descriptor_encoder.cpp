@@ -175,13 +175,14 @@ void collect(const Tile& t, const CollectLayer& layer, const kernels::Floats& me
   const Index k = layer.gate_rows(), c = t.vector_rows(), h = t.scalar_rows();
   const CloudDescriptors& out = t.f.out;
   const kernels::Coordinates places{out.x.data(), out.y.data(), out.z.data()};
+  const Index length = layer.message_length();
+  kernels::collect_rows(places, out.count, t.first, t.width, layer.radius, messages.data(), length,
+                        t.s.collect, t.s.message.data());
   const float inverse = 1.0f / layer.radius;
   for (Index p = 0; p < t.width; ++p) {
     const Index point = t.first + p;
     const float place[3] = {out.x[point], out.y[point], out.z[point]};
-    float* sum = t.s.message.data();
-    kernels::collect_rows(places, out.count, point, layer.radius, messages.data(),
-                          layer.message_length(), t.s.collect, sum);
+    const float* sum = t.s.message.data() + p * length;
     const float* gate = sum + 3 * k;
     for (Index axis = 0; axis < 3; ++axis) {
       float* column = t.s.collected.data() + (axis * t.width + p) * (k + c);

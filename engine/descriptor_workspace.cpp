@@ -45,8 +45,8 @@ void allocate_scratch(const DescriptorModel& model, Index encoded, Index max_poi
   allocate(s.scalar_inputs, padded(kernels::moment_scalars) * points);
   allocate(s.gate, std::max(c, k) * points);
   for (Floats* vectors : {&s.normalized, &s.h}) allocate(*vectors, c * columns);
-  allocate(s.message,
-           std::max(model.local_collect.message_length(), model.context_collect.message_length()));
+  allocate(s.message, points * std::max(model.local_collect.message_length(),
+                                        model.context_collect.message_length()));
   allocate(s.collected, (k + c) * columns);
   allocate(s.near, h * points);
   allocate(s.partners, padded(a.products) * columns);

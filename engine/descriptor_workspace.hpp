@@ -37,7 +37,7 @@ struct DescriptorScratch {
   kernels::Floats leaf_bounds;
   kernels::CollectScratch collect;
   kernels::Floats local_inputs, scalar_inputs, gate, normalized, h;
-  kernels::Floats message;    // of one point, summed
+  kernels::Floats message;    // of each point's neighbourhood, summed
   kernels::Floats collected;  // K + C
   kernels::Floats near, partners, mlp_input, hidden, frames, logits;
 };

@@ -31,11 +31,12 @@ struct MatchBuffers {
   kernels::Floats similarity;  // source x target: exp(similarity - largest)
   float largest = 0;
   kernels::Floats row_sum, column_sum, column_weight;
+  kernels::Floats block_largest, block_sum;  // per product_block rows; their column sums
   std::vector<Match> matches;
   kernels::Floats place[2][3];             // of the matches' points, per cloud and axis
   kernels::Floats compatibility, support;  // matches x matches
   kernels::Floats total_support;
-  std::vector<std::uint16_t> order, seeds;
+  std::vector<std::uint16_t> seeds;
   std::vector<Motion> motions;  // what the matches propose
 
   MatchBuffers() = default;

@@ -68,11 +68,14 @@ class NormalEquations {
   }
 
  private:
+  using Numbers = Eigen::Map<const Eigen::ArrayXf, Eigen::Aligned64>;
+
   static double dot(const float* a, const float* b, Index count) noexcept {
-    float sum = 0;
-#pragma omp simd reduction(+ : sum)
-    for (Index i = 0; i < count; ++i) sum += a[i] * b[i];
-    return static_cast<double>(sum);
+    return static_cast<double>((Numbers(a, count) * Numbers(b, count)).sum());
+  }
+
+  static double total(const float* a, Index count) noexcept {
+    return static_cast<double>(Numbers(a, count).sum());
   }
 
   void add_points(const Matches& m, const float* weight) noexcept {
@@ -91,9 +94,9 @@ class NormalEquations {
       for (int d = 0; d < 3; ++d) squares_(a, d) += dot(weighted[a], position[d], m.count);
       torque_(a) += dot(weighted[b], offset[c], m.count) - dot(weighted[c], offset[b], m.count);
       offset_(a) += dot(weight, offset[a], m.count);
-      for (Index i = 0; i < m.count; ++i) sum_(a) += static_cast<double>(weighted[a][i]);
+      sum_(a) += total(weighted[a], m.count);
     }
-    for (Index i = 0; i < m.count; ++i) weights_ += static_cast<double>(weight[i]);
+    weights_ += total(weight, m.count);
   }
 
   Matrix6 matrix_ = Matrix6::Zero();  // lower triangle

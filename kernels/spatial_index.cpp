@@ -13,27 +13,24 @@ inline float squared_distance(float dx, float dy, float dz) noexcept {
   return (dx * dx + dy * dy) + dz * dz;
 }
 
-/// How far q lies outside [low, high], 0 inside.
-inline float outside(float q, float low, float high) noexcept {
-  const float below = low - q;
-  const float above = q - high;
-  const float farther = below > above ? below : above;
-  return farther > 0.0f ? farther : 0.0f;
+// Array expressions, because the compiler turns loops over comparisons with 0 into branches.
+using Numbers = Eigen::Map<const Eigen::ArrayXf>;
+
+Numbers view(const Floats& numbers, Index count) noexcept { return {numbers.data(), count}; }
+
+/// How far q lies outside of each [low, high], 0 inside.
+auto outside(float q, const Numbers& low, const Numbers& high) noexcept {
+  return (low - q).max(q - high).max(0.0f);
 }
 
-/// How far [a_low, a_high] and [b_low, b_high] are apart, 0 when they overlap.
-inline float gap(float a_low, float a_high, float b_low, float b_high) noexcept {
-  const float below = b_low - a_high;
-  const float above = a_low - b_high;
-  const float farther = below > above ? below : above;
-  return farther > 0.0f ? farther : 0.0f;
+/// How far [from, to] and each [low, high] are apart, 0 when they overlap.
+auto gap(float from, float to, const Numbers& low, const Numbers& high) noexcept {
+  return (low - to).max(from - high).max(0.0f);
 }
 
-/// The largest difference between a number of each interval.
-inline float span(float a_low, float a_high, float b_low, float b_high) noexcept {
-  const float up = b_high - a_low;
-  const float down = a_high - b_low;
-  return up > down ? up : down;
+/// The largest difference between a number of [from, to] and one of each [low, high].
+auto span(float from, float to, const Numbers& low, const Numbers& high) noexcept {
+  return (high - from).max(to - low);
 }
 
 }  // namespace
@@ -129,37 +126,24 @@ Box SpatialIndex::box(Index leaf) const noexcept {
 }
 
 void SpatialIndex::box_bounds(const Box& box, float* nearest, float* farthest) const noexcept {
-  const float* low_x = low_[0].data();
-  const float* low_y = low_[1].data();
-  const float* low_z = low_[2].data();
-  const float* high_x = high_[0].data();
-  const float* high_y = high_[1].data();
-  const float* high_z = high_[2].data();
-  const Index n = leaves();
-#pragma omp simd
-  for (Index l = 0; l < n; ++l) {
-    nearest[l] = squared_distance(gap(box.low[0], box.high[0], low_x[l], high_x[l]),
-                                  gap(box.low[1], box.high[1], low_y[l], high_y[l]),
-                                  gap(box.low[2], box.high[2], low_z[l], high_z[l]));
-    farthest[l] = squared_distance(span(box.low[0], box.high[0], low_x[l], high_x[l]),
-                                   span(box.low[1], box.high[1], low_y[l], high_y[l]),
-                                   span(box.low[2], box.high[2], low_z[l], high_z[l]));
-  }
+  const auto along = [&](std::size_t axis, auto measure) {
+    return measure(box.low[axis], box.high[axis], view(low_[axis], leaves()),
+                   view(high_[axis], leaves()));
+  };
+  const auto squares = [&](auto measure) {
+    return (along(0, measure).square() + along(1, measure).square()) + along(2, measure).square();
+  };
+  Eigen::Map<Eigen::ArrayXf>(nearest, leaves()) =
+      squares([](auto... interval) { return gap(interval...); });
+  Eigen::Map<Eigen::ArrayXf>(farthest, leaves()) =
+      squares([](auto... interval) { return span(interval...); });
 }
 
 void SpatialIndex::leaf_bounds(float x, float y, float z, float* bounds) const noexcept {
-  const float* low_x = low_[0].data();
-  const float* low_y = low_[1].data();
-  const float* low_z = low_[2].data();
-  const float* high_x = high_[0].data();
-  const float* high_y = high_[1].data();
-  const float* high_z = high_[2].data();
-  const Index n = leaves();
-#pragma omp simd
-  for (Index l = 0; l < n; ++l) {
-    bounds[l] = squared_distance(outside(x, low_x[l], high_x[l]), outside(y, low_y[l], high_y[l]),
-                                 outside(z, low_z[l], high_z[l]));
-  }
+  const auto along = [&](std::size_t axis, float q) {
+    return outside(q, view(low_[axis], leaves()), view(high_[axis], leaves())).square();
+  };
+  Eigen::Map<Eigen::ArrayXf>(bounds, leaves()) = (along(0, x) + along(1, y)) + along(2, z);
 }
 
 void SpatialIndex::leaf_distances(Index leaf, float x, float y, float z,
