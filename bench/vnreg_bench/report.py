@@ -63,8 +63,9 @@ def how_measured(report: Report) -> str:
             "- **Run**: times are medians of rounds that call everything in turns. Every process is"
             " pinned to as many processors as it has threads; one thread unless the table says "
             "otherwise. The last table says when, at which commit and beside what load each part "
-            "was measured. Priority *real-time*: the benchmark came before all other programs on "
-            "its processors; what those did to shared caches, memory and clock is in the figures.",
+            "was measured. Priority *real-time*: the benchmark came before ordinary programs on "
+            "its processors, and took turns with others of its class; what they did to shared "
+            "caches, memory and clock is in the figures.",
         ]
     )
 
