@@ -71,12 +71,14 @@ def how_measured(report: Report) -> str:
 
 
 def parts_table(report: Report) -> str:
-    """How each part was measured. The load counts the benchmark itself, and what else ran."""
-    lines = []
+    """How each part was measured, and what was noted of it by hand (`note` in the JSON). The load
+    counts the benchmark itself, and what else ran."""
+    lines, notes = [], []
     for name, title, _ in SECTIONS:
         if name in report:
             about = report["measured"][name]
             settings = about["settings"]
+            notes += [f"\n{title}: {about['note']}"] if "note" in about else []
             lines.append(
                 (
                     title,
@@ -88,9 +90,8 @@ def parts_table(report: Report) -> str:
                     "real-time" if about["real_time"] else "ordinary",
                 )
             )
-    return table(
-        ("part", "date", "commit", "minutes", "runs", "load before – after", "priority"), lines
-    )
+    head = ("part", "date", "commit", "minutes", "runs", "load before – after", "priority")
+    return "\n".join([table(head, lines), *notes])
 
 
 def points_section(report: Report) -> list[str]:
