@@ -8,8 +8,11 @@ namespace {
 // Newton's steps from an upper bound down to the largest root: convex there, so none passes it.
 constexpr int newton_steps = 14;
 // Of the slope at the root, relative to the cube of the root: 4 (s2 + s3) (s1 + s2) (s1 + s3) for
-// singular values s1 >= s2 >= |s3|.
-constexpr double least_slope = 1e-6;
+// singular values s1 >= s2 >= |s3|. Where it vanishes the root is double or triple, and the steps
+// that halve the way to it, or leave two thirds, end at a slope of up to 4e-4.
+constexpr double least_slope = 1e-3;
+// Of the squared entries' sum: what is below counts as the zero matrix.
+constexpr double least_squares = 1e-200;
 
 /// The largest eigenvalue of Davenport's matrix K, whose characteristic polynomial is
 /// t^4 + quadratic t^2 + linear t + constant; `bound` is no smaller.
@@ -55,7 +58,8 @@ void fit_rotations(const MatrixBatch& h, Index count, MatrixBatch& rotation,
     const double n13 = k12 * k33 - k23 * k13, n23 = k22 * k33 - k23 * k23;
     const double constant = m01 * n23 - m02 * n13 + m03 * n12 + m12 * n03 - m13 * n02 + m23 * n01;
     const double t = largest_root(-2, -8 * determinant, constant, 1.7320508075688774);
-    certainty[i] = ((4 * t * t - 4) * t - 8 * determinant) - least_slope * t * t * t;
+    const double slope = (4 * t * t - 4) * t - 8 * determinant;
+    certainty[i] = squares > least_squares ? slope - least_slope * t * t * t : -1;
     // The columns of the adjugate of L = K - t I.
     const double l0 = k00 - t, l1 = k11 - t, l2 = k22 - t, l3 = k33 - t;
     const double s23 = l2 * l3 - k23 * k23, s13 = k12 * l3 - k23 * k13;

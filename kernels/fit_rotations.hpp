@@ -13,7 +13,7 @@ struct MatrixBatch {
 
 /// The rotations R that maximise trace(R^T H) for the first `count` matrices H = sum y x^T, finite.
 /// determined[i] is false, and the rotation any, where H fixes none: its two least singular values
-/// cancel, or there is but one, to within 1e-6 of the largest.
+/// cancel, or there is but one, to within 3e-4 of the largest.
 void fit_rotations(const MatrixBatch& h, Index count, MatrixBatch& rotation,
                    bool determined[MatrixBatch::capacity]) noexcept;
 
