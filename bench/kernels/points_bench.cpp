@@ -9,11 +9,13 @@
 #include <random>
 
 #include "kernels/collect.hpp"
+#include "kernels/list_within.hpp"
 #include "kernels/moments.hpp"
 #include "kernels/nearest_grid.hpp"
 #include "kernels/neighbours.hpp"
 #include "kernels/operands.hpp"
 #include "kernels/oriented_points.hpp"
+#include "kernels/surroundings.hpp"
 #include "roofline.hpp"
 
 namespace vnreg::bench {
@@ -250,19 +252,22 @@ void moment_features_points(benchmark::State& state) {
 }
 BENCHMARK(moment_features_points)->Arg(512)->Unit(benchmark::kMicrosecond);
 
-/// Sums of messages of 192 numbers over the neighbourhoods of all points, radius 0.5.
+/// Sums of messages of 192 numbers over the neighbourhoods of all points, radius 0.5, tile by tile
+/// in spatial order.
 void collect_neighbourhoods(benchmark::State& state) {
   constexpr Index length = 192;
   constexpr float radius = 0.5f;
   const Index points_count = state.range(0);
   const Sphere points(points_count);
+  SpatialIndex index(points_count);
+  index.build(points.coordinates(), points_count);
   const Floats rows = random_floats(points_count * length);
   CollectScratch scratch(points_count);
-  Floats out = room(length);
+  Floats out = room(tile * length);
   for (auto _ : state) {
-    for (Index i = 0; i < points_count; ++i) {
-      collect_rows(points.coordinates(), points_count, i, radius, rows.data(), length, scratch,
-                   out.data());
+    for (Index first = 0; first < points_count; first += tile) {
+      collect_rows(index.ordered(), points_count, first, std::min(tile, points_count - first),
+                   radius, rows.data(), length, scratch, out.data());
       benchmark::ClobberMemory();
     }
   }
@@ -271,6 +276,42 @@ void collect_neighbourhoods(benchmark::State& state) {
                 4 * n * (2 * length + 3)});
 }
 BENCHMARK(collect_neighbourhoods)->Arg(256)->Arg(512)->Arg(1024)->Unit(benchmark::kMicrosecond);
+
+/// Which of the distances of one point from all others are within a radius.
+void mark_within_limit(benchmark::State& state) {
+  const Index points_count = state.range(0);
+  const Floats values = random_floats(points_count);
+  std::vector<std::uint8_t> within(static_cast<std::size_t>(points_count));
+  for (auto _ : state) {
+    mark_within(values.data(), points_count, -0.1f, within.data());
+    benchmark::ClobberMemory();
+  }
+  count(state, {as_double(points_count), 5 * as_double(points_count)});
+}
+BENCHMARK(mark_within_limit)->Arg(256)->Arg(1024);
+
+/// Weight, offset and covariance of what lies about every 16th point, at two radii. Counted: 30
+/// flops for every point within a radius.
+void surroundings_of_points(benchmark::State& state) {
+  constexpr float two_radii[surroundings_radii] = {0.25f, 0.5f};
+  const Index points_count = state.range(0);
+  const Sphere points(points_count);
+  SpatialIndex index(points_count);
+  index.build(points.coordinates(), points_count);
+  Floats bounds = room(index.leaves() + packet_size);
+  Surroundings out[surroundings_radii];
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < points.x.size(); i += 16) {
+      const float centre[3] = {points.x[i], points.y[i], points.z[i]};
+      surroundings(index, centre, two_radii, bounds.data(), out);
+      benchmark::DoNotOptimize(out);
+    }
+  }
+  double pairs = 0;
+  for (const float radius : two_radii) pairs += pairs_within(points, radius) / 16;
+  count(state, {30 * pairs, as_double(points_count) * (12 + sizeof(out) / 16.0)});
+}
+BENCHMARK(surroundings_of_points)->Arg(1024)->Arg(2048)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace vnreg::bench

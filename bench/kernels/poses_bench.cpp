@@ -1,4 +1,9 @@
 // Kernels of the registers: pair features, selection, poses.
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/fit_rotations.hpp"
+#include "kernels/least_direction.hpp"
 #include "kernels/operands.hpp"
 #include "kernels/pair_features.hpp"
 #include "kernels/procrustes.hpp"
@@ -50,18 +55,51 @@ void procrustes_pairs(benchmark::State& state) {
 }
 BENCHMARK(procrustes_pairs)->Arg(12)->Arg(128)->Arg(1024)->Unit(benchmark::kMicrosecond);
 
-/// Rotations of 512 matrices 3 x 3: what the matches of descriptors ask for.
-void fit_rotations(benchmark::State& state) {
+/// One rotation after the other; what the batches below are compared with.
+void fit_rotation_single(benchmark::State& state) {
   std::vector<Eigen::Matrix3d> h(static_cast<std::size_t>(state.range(0)));
-  for (std::size_t i = 0; i < h.size(); ++i) {
-    h[i] = random_matrix(3, 3, i + 1).cast<double>();
-  }
+  for (std::size_t i = 0; i < h.size(); ++i) h[i] = random_matrix(3, 3, i + 1).cast<double>();
   for (auto _ : state) {
     for (const Eigen::Matrix3d& matrix : h) benchmark::DoNotOptimize(fit_rotation(matrix));
   }
   count(state, {0, as_double(state.range(0)) * (72 + sizeof(RotationFit))});
 }
-BENCHMARK(fit_rotations)->Arg(512)->Unit(benchmark::kMicrosecond);
+BENCHMARK(fit_rotation_single)->Arg(64)->Unit(benchmark::kMicrosecond);
+
+/// A batch of matrices 3 x 3 to rotations, float64.
+void fit_rotation_batch(benchmark::State& state) {
+  const Floats values = random_floats(9 * MatrixBatch::capacity);
+  MatrixBatch h, rotation;
+  for (Index e = 0; e < 9; ++e) {
+    std::copy_n(values.data() + e * MatrixBatch::capacity, MatrixBatch::capacity, h.entry[e]);
+  }
+  bool determined[MatrixBatch::capacity];
+  for (auto _ : state) {
+    fit_rotations(h, state.range(0), rotation, determined);
+    benchmark::ClobberMemory();
+  }
+  count(state, {0, as_double(state.range(0)) * (72 + 72 + 1)});
+}
+BENCHMARK(fit_rotation_batch)->Arg(64)->Unit(benchmark::kMicrosecond);
+
+/// Normals of tangent planes from covariances.
+void least_direction_batch(benchmark::State& state) {
+  const Index matrices = state.range(0);
+  Floats entries[6], out[3];
+  for (std::size_t e = 0; e < 6; ++e) entries[e] = random_floats(matrices, e + 1);
+  for (const std::size_t diagonal : {0, 3, 5}) {
+    for (float& v : entries[diagonal]) v = 1 + std::abs(v);
+  }
+  for (Floats& o : out) o = room(matrices);
+  for (auto _ : state) {
+    least_directions({entries[0].data(), entries[1].data(), entries[2].data(), entries[3].data(),
+                      entries[4].data(), entries[5].data()},
+                     matrices, out[0].data(), out[1].data(), out[2].data());
+    benchmark::ClobberMemory();
+  }
+  count(state, {0, 36 * as_double(matrices)});
+}
+BENCHMARK(least_direction_batch)->Arg(64)->Arg(1024)->Unit(benchmark::kMicrosecond);
 
 void top_sixth(benchmark::State& state) {
   const Floats values = random_floats(state.range(0));
