@@ -55,7 +55,7 @@ TEST_CASE_METHOD(Clouds, "whatever the budget, a status and no pose or a rigid o
     for (double share = 0.02; share < 0.97; share += 0.025) align_within(share);
     // Poses come late; how late, on a busy machine, differs from call to call.
     for (int i = 0; i < 500 && with_pose == 0; ++i) align_within(0.6 + 0.01 * (i % 60));
-    REQUIRE(timed_out > 10);
+    REQUIRE(timed_out > with_pose);  // some ended too early for a pose
     REQUIRE(with_pose > 0);
   }
 }
