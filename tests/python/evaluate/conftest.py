@@ -15,7 +15,6 @@ from vnreg_train.data.shapes import ShapeSet, load_shapes
 from vnreg_train.evaluate.estimates import Estimate
 
 POINTS = 4096
-SHIPPED = Path(__file__).resolve().parents[3] / "models" / "small.vnr"
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import SHIPPED
+from shipped import SHIPPED
 
 import vnreg
 from vnreg_train.data.protocol import make_pair

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from conftest import SHIPPED
+from shipped import SHIPPED
 
 from vnreg_train.cli import parser
 from vnreg_train.evaluate import commands

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import SHIPPED
+from shipped import SHIPPED
 
 from vnreg_train.evaluate.methods import EngineMethod
 from vnreg_train.evaluate.rows import ROWS, select_rows
