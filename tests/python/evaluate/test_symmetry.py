@@ -166,6 +166,6 @@ def test_the_committed_list_can_be_read_and_says_how_it_was_made() -> None:
     content = json.loads((ROOT / SYMMETRIES).read_text(encoding="utf-8"))
     assert content["rebuild"] == "vnreg-train find-symmetries"
     groups = read_symmetries(ROOT / SYMMETRIES)
-    assert len(groups) == 163 + 82
-    assert 20 < sum(not g.trivial for g in groups.values()) < 200
+    assert len(groups) == 575 + 163 + 82
+    assert 100 < sum(not g.trivial for g in groups.values()) < 400
     assert all(axis.residual <= 0.01 for g in groups.values() for axis in g.axes)
