@@ -71,14 +71,12 @@ def how_measured(report: Report) -> str:
 
 
 def parts_table(report: Report) -> str:
-    """How each part was measured, and what was noted of it by hand (`note` in the JSON). The load
-    counts the benchmark itself, and what else ran."""
-    lines, notes = [], []
+    """How each part was measured. The load counts the benchmark itself, and what else ran."""
+    lines = []
     for name, title, _ in SECTIONS:
         if name in report:
             about = report["measured"][name]
             settings = about["settings"]
-            notes += [f"\n{title}: {about['note']}"] if "note" in about else []
             lines.append(
                 (
                     title,
@@ -91,7 +89,7 @@ def parts_table(report: Report) -> str:
                 )
             )
     head = ("part", "date", "commit", "minutes", "runs", "load before – after", "priority")
-    return "\n".join([table(head, lines), *notes])
+    return table(head, lines)
 
 
 def points_section(report: Report) -> list[str]:
