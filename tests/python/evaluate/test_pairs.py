@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,10 @@ from scipy.spatial import cKDTree
 
 from vnreg_train.data.protocol import Pair, make_pair, rotation_error_deg
 from vnreg_train.data.shapes import ShapeSet
+from vnreg_train.data.views import visible
 from vnreg_train.evaluate import pairs as pairs_module
 from vnreg_train.evaluate.pairs import honest_pair, make_pairs, shape_indices, uniform_pose
-from vnreg_train.evaluate.rows import P1_FACTORS, ROWS, Factors
+from vnreg_train.evaluate.rows import P1_FACTORS, ROWS, VIEW_FACTORS, Factors
 
 Points = NDArray[np.float64]
 
@@ -123,7 +125,44 @@ def test_rotations_are_uniform() -> None:
     assert np.abs(rotations.mean(0)).max() < 0.05
 
 
-@pytest.mark.parametrize("row", [f"P1/{name}" for name in P1_FACTORS] + ["P0/partial/90"])
+def test_a_view_shows_one_side(shapes: ShapeSet) -> None:
+    """Of a convex body seen from afar: the points whose normal looks that way, about half."""
+    rng = np.random.default_rng(4)
+    sphere = rng.normal(size=(6, 16384, 3))
+    sphere /= 2 * np.linalg.norm(sphere, axis=2, keepdims=True)
+    balls = replace(shapes, surface=sphere.astype(np.float32))
+    pair = honest_pair(balls, 0, "row", Factors(views=1), 1)
+    source, target = in_object_frame(pair)
+    middle = source.mean(0)
+    viewpoint = 3 * middle / np.linalg.norm(middle)
+    # What a viewpoint at distance d sees of a ball of radius r: <x, direction> >= r^2 / d.
+    depth = source @ viewpoint / 3
+    assert depth.min() > 0.25 / 3 - 0.1
+    assert np.abs(target.mean(0)).max() < 0.05 < np.linalg.norm(middle)
+    shown = (sphere[0] @ viewpoint / 3 > 0.25 / 3).mean()
+    assert pair.overlap == pytest.approx((1 + shown) / 2, abs=0.05)
+
+
+def test_two_views_are_not_far_apart(shapes: ShapeSet) -> None:
+    """They see nearly the same at 0 degrees, and less together at 60."""
+    overlaps = [honest_pair(shapes, 1, "row", Factors(views=2), s).overlap for s in range(40)]
+    assert 0.3 < min(overlaps) < 0.8 < max(overlaps) <= 1
+
+
+def test_nothing_is_seen_from_within_a_plane() -> None:
+    flat = np.random.default_rng(0).uniform(-1, 1, (50, 3)) * [1, 1, 0]
+    with pytest.raises(ValueError, match="no view"):
+        visible(flat, np.array([3.0, 0.0, 0.0]))
+    with pytest.raises(ValueError, match="the viewpoint lies on a point"):
+        visible(flat, flat[7])
+
+
+@pytest.mark.parametrize(
+    "row",
+    [f"P1/{name}" for name in P1_FACTORS]
+    + [f"views/{name}" for name in VIEW_FACTORS]
+    + ["P0/partial/90"],
+)
 def test_pairs_are_a_pure_function_of_their_words(data_folder: Path, row: str) -> None:
     every = make_pairs("validation", row, data=data_folder)
     assert [pair.shape for pair in every] == list(range(6))

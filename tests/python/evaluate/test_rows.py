@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from vnreg_train.evaluate.rows import BAR_ROWS, P1_FACTORS, ROWS, select_rows
+from vnreg_train.evaluate.rows import BAR_ROWS, P1_FACTORS, ROWS, VIEW_FACTORS, select_rows
 
 
 def names(*patterns: str) -> list[str]:
@@ -12,9 +12,10 @@ def names(*patterns: str) -> list[str]:
 
 
 def test_the_paper_has_sixteen_rows_and_every_factor_one() -> None:
-    assert len(ROWS) == 16 + len(P1_FACTORS)
+    assert len(ROWS) == 16 + len(P1_FACTORS) + len(VIEW_FACTORS)
     assert len(names("p0")) == 16
     assert names("P1") == [f"P1/{name}" for name in P1_FACTORS]
+    assert names("views") == [f"views/{name}" for name in VIEW_FACTORS]
     assert set(names("all")) == set(ROWS)
     assert set(names("bars")) == set(BAR_ROWS)
 

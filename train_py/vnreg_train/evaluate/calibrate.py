@@ -27,8 +27,8 @@ from vnreg_train.model_file import read_model, write_model
 
 RIDGE = {"paper": 1e-3, "verified": 1e-3}
 PREFIX = {"paper": "calibration.", "verified": "calibration.verified."}
-# Verified: every P1 row, and P0 as much as the users of its protocol deserve.
-ROWS = {"paper": ("p0",), "verified": ("p1", "P0/*/180")}
+# Verified: every row of P1 and of views, and P0 as much as the users of its protocol deserve.
+ROWS = {"paper": ("p0",), "verified": ("p1", "views", "P0/*/180")}
 
 
 @dataclass(frozen=True)

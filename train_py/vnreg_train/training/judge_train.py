@@ -21,7 +21,8 @@ from vnreg_train.networks.judge import POINTS, JudgeNetwork
 from vnreg_train.training.judge_samples import JudgeSamples
 
 KEY = "channels.judge"
-# What the judge has to decide on: every row of P1, and the paper's with its shared points.
+# What the judge has to decide on: every row of P1 and of views, and the paper's with its shared
+# points.
 ROWS = (
     "P1/independent",
     "P1/noise_0.01",
@@ -34,6 +35,8 @@ ROWS = (
     "P1/partial_75_noise_0.01",
     "P1/partial_50_noise_0.01",
     "P1/all",
+    "views/scan_to_model",
+    "views/two_scans",
     "P0/noisy/180",
     "P0/partial/180",
 )
