@@ -7,8 +7,8 @@ VENV ?= .venv
 PY := $(VENV)/bin/python
 PRESET ?= release
 CLI := build/$(PRESET)/vnreg
-DEBIAN := cmake ninja-build g++ libeigen3-dev catch2 libcli11-dev nlohmann-json3-dev \
-          libbenchmark-dev python3-dev python3-venv
+DEBIAN := cmake ninja-build ccache g++ libeigen3-dev catch2 libcli11-dev nlohmann-json3-dev \
+          libbenchmark-dev python3-dev python3-venv doxygen
 # What the wheel of Open3D, a peer of `make evaluate`, links with.
 PEERS_DEBIAN := libusb-1.0-0 libgl1 libegl1 libidn2-0
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)

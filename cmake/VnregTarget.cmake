@@ -1,13 +1,22 @@
-# What every target of the project shares: warnings, sanitizers (by preset) and the instruction set.
-# Eigen is a system include, so its own warnings stay quiet; the instruction set is private, so
-# users of the installed library never inherit it.
-add_library(vnreg_build_flags INTERFACE)
+# What every target of the project shares: warnings and sanitizers (by preset). Eigen is a system
+# include, so its own warnings stay quiet. What is compiled with these flags alone runs on every
+# processor: the program, the reader of model files, the Python module.
+add_library(vnreg_baseline_flags INTERFACE)
 # Unique symbols would stay visible in the static library, where nothing but the API may be.
-target_compile_options(vnreg_build_flags INTERFACE
-  -Wall -Wextra -Wconversion -Wshadow -march=${VNREG_ISA} -ffp-contract=fast -fno-math-errno
+target_compile_options(vnreg_baseline_flags INTERFACE
+  -Wall -Wextra -Wconversion -Wshadow -ffp-contract=fast -fno-math-errno
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-fno-gnu-unique>
   $<$<BOOL:${VNREG_WERROR}>:-Werror>)
-target_compile_definitions(vnreg_build_flags INTERFACE EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY)
+target_compile_definitions(vnreg_baseline_flags INTERFACE EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY)
+
+# With the instruction set, private, so that users of the installed library never inherit it.
+add_library(vnreg_build_flags INTERFACE)
+target_link_libraries(vnreg_build_flags INTERFACE vnreg_baseline_flags)
+target_compile_options(vnreg_build_flags INTERFACE -march=${VNREG_ISA})
+# Takes the instruction set back, for single files.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  set(VNREG_BASELINE_OPTION -march=x86-64)
+endif()
 # The public headers; split from the engine so that kernels and model_format can name vnreg::Error.
 add_library(vnreg_api INTERFACE)
 target_include_directories(vnreg_api INTERFACE

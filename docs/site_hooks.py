@@ -1,7 +1,8 @@
 """What MkDocs cannot do by itself: pages that are made of files elsewhere in the repository.
 
-A line `{{ file PATH }}` becomes the content of a Markdown file, `{{ code LANGUAGE PATH }}` that of
-a source file as code, `{{ module vnreg }}` the documentation of the Python module.
+A line `{{ file PATH }}` becomes the content of a Markdown file, `{{ module vnreg }}` the
+documentation of the Python module. The folder `api` of the site is what Doxygen makes of the
+public headers.
 """
 
 from __future__ import annotations
@@ -10,9 +11,12 @@ import ast
 import importlib
 import inspect
 import re
+import subprocess
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+
+from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parents[1]
 OUTSIDE = re.compile(r"\]\((?:\.\./)+([^)#]*)(#[^)]*)?\)")
@@ -27,6 +31,33 @@ def on_config(config: Any) -> Any:
     return config
 
 
+def on_files(files: Any, config: Any) -> Any:
+    """Called by MkDocs with the site's files: adds the reference of the headers."""
+    folder = ROOT / "build/doxygen"
+    run_doxygen(folder)
+    for path in sorted(folder.rglob("*")):
+        if path.is_file():
+            name = f"api/{path.relative_to(folder).as_posix()}"
+            files.append(File.generated(config, name, abs_src_path=str(path)))
+    return files
+
+
+def run_doxygen(folder: Path, headers: Path = ROOT / "engine/include") -> None:
+    """Writes the reference of the public headers and its list of names, `vnreg.tag`, to `folder`.
+
+    Fails where a header has something that is not documented.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    settings = (ROOT / "docs/doxygen/Doxyfile").read_text(encoding="utf-8")
+    settings += f"OUTPUT_DIRECTORY = {folder}\nGENERATE_TAGFILE = {folder / 'vnreg.tag'}\n"
+    settings += f"INPUT = {headers / 'vnreg'} docs/doxygen/main.md\nSTRIP_FROM_PATH = {headers}\n"
+    done = subprocess.run(
+        ["doxygen", "-"], cwd=ROOT, input=settings, capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        raise RuntimeError(f"doxygen: {done.stderr}")
+
+
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Called by MkDocs with the text of every page."""
     text = re.sub(r"^\{\{ (\w+) (.+?) \}\}$", _replacement, markdown, flags=re.M)
@@ -38,9 +69,6 @@ def _replacement(match: re.Match[str]) -> str:
     kind, argument = match[1], match[2]
     if kind == "file":
         return (ROOT / argument).read_text(encoding="utf-8")
-    if kind == "code":
-        language, path = argument.split()
-        return f"```{language}\n{(ROOT / path).read_text(encoding='utf-8')}```"
     if kind == "module":
         return module_reference(importlib.import_module(argument))
     raise ValueError(f"unknown instruction: {match[0]}")

@@ -50,11 +50,4 @@ PreparedCloud BatchRegistrar::prepare(PointsView cloud) {
 
 int BatchRegistrar::threads() const noexcept { return state_->threads; }
 
-std::vector<Result> align_many(std::span<const CloudPair> pairs, const Options& options) {
-  static const Model model = Model::builtin();
-  std::vector<Result> results(pairs.size());
-  if (!pairs.empty()) BatchRegistrar(model, options).align_many(pairs, results);
-  return results;
-}
-
 }  // namespace vnreg

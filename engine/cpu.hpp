@@ -1,4 +1,4 @@
-// Which instructions this build uses, and whether the processor has them.
+// Whether the processor has the instructions that this build uses.
 #pragma once
 
 namespace vnreg::detail {

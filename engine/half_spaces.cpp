@@ -1,9 +1,7 @@
 #include "engine/half_spaces.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <numbers>
 
 namespace vnreg::detail {
 namespace {
@@ -26,33 +24,14 @@ using Packet = kernels::Packet;
 static_assert(half_space_directions % (2 * packet_size) == 0);
 constexpr Index points_per_excess = 80;
 
-struct Directions {
-  alignas(64) float x[half_space_directions], y[half_space_directions], z[half_space_directions];
-
-  /// A Fibonacci lattice: equal areas, no two directions close.
-  Directions() noexcept {
-    constexpr double golden_angle = std::numbers::pi * (3.0 - 2.2360679774997896964);
-    for (Index i = 0; i < half_space_directions; ++i) {
-      const double height = 1.0 - (2.0 * static_cast<double>(i) + 1.0) / half_space_directions;
-      const double across = std::sqrt(1.0 - height * height);
-      const double angle = golden_angle * static_cast<double>(i);
-      x[i] = static_cast<float>(across * std::cos(angle));
-      y[i] = static_cast<float>(across * std::sin(angle));
-      z[i] = static_cast<float>(height);
-    }
-  }
-};
-
-const Directions directions;
-
 /// The projections of a point on as many directions, from the k-th on, as a packet has lanes.
 struct Lanes {
   Packet x, y, z;
 
   explicit Lanes(Index k) noexcept
-      : x(pload<Packet>(directions.x + k)),
-        y(pload<Packet>(directions.y + k)),
-        z(pload<Packet>(directions.z + k)) {}
+      : x(pload<Packet>(sphere_directions.x + k)),
+        y(pload<Packet>(sphere_directions.y + k)),
+        z(pload<Packet>(sphere_directions.z + k)) {}
 
   Packet along(const kernels::Coordinates& points, Index i) const noexcept {
     return pmadd(pset1<Packet>(points.z[i]), z,
@@ -101,7 +80,7 @@ HalfSpace most_beyond(const kernels::Coordinates& points, Index count,
     pstore(beyond + k + packet_size, sum[1]);
   }
   const auto best = std::max_element(beyond, beyond + half_space_directions) - beyond;
-  return {directions.x[best], directions.y[best], directions.z[best],
+  return {sphere_directions.x[best], sphere_directions.y[best], sphere_directions.z[best],
           extents[static_cast<std::size_t>(best)], static_cast<Index>(beyond[best])};
 }
 

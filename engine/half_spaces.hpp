@@ -5,6 +5,7 @@
 
 #include <array>
 
+#include "engine/sphere_directions.hpp"
 #include "kernels/packets.hpp"
 #include "kernels/spatial_index.hpp"
 
@@ -12,8 +13,6 @@ namespace vnreg::detail {
 
 using kernels::Index;
 
-/// Directions over the sphere, 20 degrees apart. A multiple of two packets.
-inline constexpr Index half_space_directions = 96;
 /// Enough points to see where a surface ends.
 inline constexpr Index most_extent_points = 512;
 

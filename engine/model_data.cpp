@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "engine/read_model_data.hpp"
 #include "engine/tensor_set.hpp"
 
 namespace vnreg::detail {

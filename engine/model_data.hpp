@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <memory>
 #include <optional>
 
 #include "engine/architecture.hpp"
@@ -13,7 +12,6 @@
 #include "kernels/pair_features.hpp"
 #include "kernels/vn_block.hpp"
 #include "kernels/vn_linear.hpp"
-#include "model_format/model_file.hpp"
 
 namespace vnreg::detail {
 
@@ -45,8 +43,5 @@ struct ModelData {
   kernels::PairLayer pair;
   std::array<kernels::Linear, 2> weight;
 };
-
-/// Throws Error: wrong_architecture (hyper-parameters, tensors that do not belong), missing_tensor.
-std::shared_ptr<const ModelData> read_model_data(const model_format::ModelFile& file);
 
 }  // namespace vnreg::detail

@@ -9,7 +9,6 @@
 #include "engine/coarse.hpp"
 #include "engine/confidence.hpp"
 #include "engine/covariance.hpp"
-#include "engine/cpu.hpp"
 #include "engine/descriptor_encoder.hpp"
 #include "engine/encoder.hpp"
 #include "engine/fine.hpp"
@@ -296,7 +295,6 @@ std::shared_ptr<const PreparedData> RegistrarState::prepare(const PointsView& po
 }  // namespace detail
 
 Registrar::Registrar(Model model, Options options) {
-  detail::require_cpu();
   const detail::Index max_points = detail::checked_max_points(model.data(), options);
   state_ = std::make_unique<detail::RegistrarState>(std::move(model), options, max_points);
 }
@@ -313,11 +311,6 @@ PreparedCloud Registrar::prepare(PointsView cloud) { return PreparedCloud(state_
 
 const std::vector<Stage>& Registrar::stages() const noexcept {
   return state_->workspace.recorder.stages();
-}
-
-Result align(CloudRef source, CloudRef target, const Options& options) {
-  static const Model model = Model::builtin();
-  return Registrar{model, options}.align(source, target);
 }
 
 }  // namespace vnreg

@@ -1,4 +1,5 @@
-// Stopping a running call from outside.
+/// @file
+/// Stopping a running call from outside.
 #pragma once
 
 #include <atomic>
@@ -13,8 +14,11 @@ namespace vnreg {
 /// thread, raised in a signal handler, and handed through the C API.
 class Cancellation {
  public:
+  /// Ends the calls that run with it, and those that begin, until reset(). Async-signal-safe.
   void request() noexcept { requested_.store(true, std::memory_order_relaxed); }
+  /// Lets calls run again.
   void reset() noexcept { requested_.store(false, std::memory_order_relaxed); }
+  /// Whether it is raised.
   bool requested() const noexcept { return requested_.load(std::memory_order_relaxed); }
 
  private:

@@ -1,4 +1,5 @@
-// How clouds come in: borrowed, as they lie in memory.
+/// @file
+/// How clouds come in: borrowed, as they lie in memory.
 #pragma once
 
 #include <array>
@@ -17,8 +18,11 @@ namespace vnreg {
 namespace detail {
 
 template <class T>
-concept Coordinate = std::same_as < std::remove_cvref_t<T>,
-float > || std::same_as<std::remove_cvref_t<T>, double>;
+inline constexpr bool is_float_or_double =
+    std::is_same_v<std::remove_cvref_t<T>, float> || std::is_same_v<std::remove_cvref_t<T>, double>;
+
+template <class T>
+concept Coordinate = is_float_or_double<T>;
 
 /// std::array<float, 3>, Eigen::Vector3d, double[4], ...: its coordinates are [0], [1] and [2].
 template <class Point>
@@ -49,22 +53,31 @@ concept PointRange = std::ranges::contiguous_range<const Points> &&
 /// the coordinates of a point `axis_stride_bytes`. Neither needs to be aligned. Nothing is copied
 /// and nothing is kept after the call that takes the view.
 ///
-///   std::vector<std::array<float, 3>> a;       PointsView(a)
-///   std::vector<Eigen::Vector3d> b;            PointsView(b)           Open3D: cloud.points_
-///   pcl::PointCloud<pcl::PointXYZ> c;          PointsView(c)
-///   Eigen::Matrix3Xd d;                        PointsView(d.data(), d.cols())
-///   Eigen::MatrixX3d e;                        PointsView(e.data(), e.rows(), sizeof(double),
-///                                                         e.rows() * sizeof(double))
-///   sensor_msgs::PointCloud2 f, x y z float32 in a row from offset o:
-///     PointsView(reinterpret_cast<const float*>(f.data.data() + o), f.width * f.height,
-///                f.point_step)
+/// @code
+/// std::vector<std::array<float, 3>> a;   // PointsView(a)
+/// std::vector<Eigen::Vector3d> b;        // PointsView(b); Open3D: cloud.points_
+/// pcl::PointCloud<pcl::PointXYZ> c;      // PointsView(c)
+/// Eigen::Matrix3Xd d;                    // PointsView(d.data(), d.cols())
+/// Eigen::MatrixX3d e;                    // PointsView(e.data(), e.rows(), sizeof(double),
+///                                        //            e.rows() * sizeof(double))
+/// sensor_msgs::PointCloud2 f;            // x y z float32 in a row from offset o:
+///                                        // PointsView(reinterpret_cast<const float*>(
+///                                        //              f.data.data() + o),
+///                                        //            f.width * f.height, f.point_step)
+/// @endcode
 class PointsView {
  public:
-  enum class Scalar { float32, float64 };
+  /// The type of the coordinates.
+  enum class Scalar {
+    float32,  ///< float
+    float64,  ///< double
+  };
 
+  /// `count` points from `xyz` on; by default packed, x y z x y z.
   PointsView(const float* xyz, std::size_t count, std::size_t stride_bytes = 3 * sizeof(float),
              std::size_t axis_stride_bytes = sizeof(float)) noexcept
       : PointsView(xyz, count, stride_bytes, axis_stride_bytes, Scalar::float32) {}
+  /// The same of doubles.
   PointsView(const double* xyz, std::size_t count, std::size_t stride_bytes = 3 * sizeof(double),
              std::size_t axis_stride_bytes = sizeof(double)) noexcept
       : PointsView(xyz, count, stride_bytes, axis_stride_bytes, Scalar::float64) {}
@@ -75,10 +88,15 @@ class PointsView {
   PointsView(const Points& points)  // NOLINT: implicit on purpose
       : PointsView(of_range(std::ranges::data(points), std::ranges::size(points))) {}
 
+  /// The first point's x; floats or doubles, as scalar() says.
   const void* data() const noexcept { return data_; }
+  /// How many points.
   std::size_t size() const noexcept { return count_; }
+  /// Bytes from a point to the next.
   std::size_t stride_bytes() const noexcept { return stride_bytes_; }
+  /// Bytes from x to y, and from y to z.
   std::size_t axis_stride_bytes() const noexcept { return axis_stride_bytes_; }
+  /// What the coordinates are.
   Scalar scalar() const noexcept { return scalar_; }
 
  private:
