@@ -46,6 +46,18 @@ bool time_is_up(std::size_t i, Deadline& deadline) noexcept {
   return i % points_per_look == 0 && deadline.passed();
 }
 
+/// Sorts by index, in pieces of a fraction of a millisecond; stops short when the deadline passes.
+void sort_by_index(Cloud::Candidate* first, Cloud::Candidate* last, Deadline& deadline) noexcept {
+  constexpr std::ptrdiff_t sorted_at_once = 4096;
+  const auto earlier = [](const auto& a, const auto& b) { return a.index < b.index; };
+  if (deadline.passed()) return;
+  if (last - first <= sorted_at_once) return std::sort(first, last, earlier);
+  Cloud::Candidate* middle = first + (last - first) / 2;
+  std::nth_element(first, middle, last, earlier);
+  sort_by_index(first, middle, deadline);
+  sort_by_index(middle, last, deadline);
+}
+
 /// The points with the smallest hashes, in the order of the input, by a heap of fixed size. Stops
 /// short when the deadline passes.
 void choose(std::size_t count, std::uint64_t seed, Deadline& deadline,
@@ -61,8 +73,7 @@ void choose(std::size_t count, std::uint64_t seed, Deadline& deadline,
     chosen.back() = candidate;
     std::push_heap(chosen.begin(), chosen.end());
   }
-  std::sort(chosen.begin(), chosen.end(),
-            [](const auto& a, const auto& b) { return a.index < b.index; });
+  sort_by_index(chosen.data(), chosen.data() + chosen.size(), deadline);
 }
 
 template <class Scalar>
@@ -75,6 +86,7 @@ bool take_points(const PointsView& points, std::uint64_t seed, Deadline& deadlin
   const bool all = points.size() <= static_cast<std::size_t>(cloud.max_points);
   cloud.count = all ? static_cast<Index>(points.size()) : cloud.max_points;
   if (!all) choose(points.size(), seed, deadline, cloud.candidates);
+  if (deadline.passed()) return false;
   for (std::size_t i = 0; i < static_cast<std::size_t>(cloud.count); ++i) {
     const Point p = read_point<Scalar>(points, all ? i : cloud.candidates[i].index);
     cloud.xyz[3 * i] = p.x;
@@ -140,7 +152,7 @@ Status gather(const PointsView& points, Index min_points, std::uint64_t seed, De
   const bool finite = points.scalar() == PointsView::Scalar::float32
                           ? take_points<float>(points, seed, deadline, cloud)
                           : take_points<double>(points, seed, deadline, cloud);
-  if (!finite) return Status::not_finite;
+  if (!finite || deadline.passed()) return Status::not_finite;
   return measure(cloud) ? Status::ok : Status::degenerate;
 }
 

@@ -31,12 +31,14 @@ std::uint16_t nearest_of(const CloudDescriptors& d, float x, float y, float z) n
   return static_cast<std::uint16_t>(nearest);
 }
 
-/// Sets nearest_encoded of all points of the surface.
-void find_encoded(const Surface& s, float radius, const CloudDescriptors& d,
+/// Sets nearest_encoded of all points of the surface. False when the deadline has passed before.
+bool find_encoded(const Surface& s, float radius, const CloudDescriptors& d, Deadline& deadline,
                   JudgedCloud& c) noexcept {
   for (std::size_t i = 0; i < static_cast<std::size_t>(s.count); ++i) {
+    if (i % 256 == 0 && deadline.passed()) return false;
     c.nearest_encoded[i] = nearest_of(d, radius * s.x[i], radius * s.y[i], radius * s.z[i]);
   }
+  return true;
 }
 
 /// The first points of the progressive order that have descriptors of their own.
@@ -238,7 +240,7 @@ void choose_judged_points(Workspace& w) noexcept {
     const Surface& s = v.surface[side];
     const CloudDescriptors& d = w.descriptors.features[side].out;
     JudgedCloud& c = v.judge.cloud[side];
-    find_encoded(s, static_cast<float>(v.radius), d, c);
+    if (!find_encoded(s, static_cast<float>(v.radius), d, w.deadline, c)) return;
     choose_points(s, d, c);
     set_log_sums(side == 0 ? v.match.row_sum : v.match.column_sum, d.count, v.match.largest, c);
     float* bounds = v.judge.scratch[static_cast<std::size_t>(thread)].leaf_bounds.data();

@@ -59,7 +59,8 @@ void find_neighbourhoods(const ModelData& model, Workspace& w) noexcept {
   parallel_for_parts(
       w.threads, w.sides, [](Index) { return 1; },
       [&](Index side, Index, int) {
-        w.cloud[side].index.build(w.cloud[side].coordinates(), w.cloud[side].count);
+        Cloud& cloud = w.cloud[side];
+        cloud.index.build(cloud.coordinates(), cloud.count, [&] { return w.deadline.passed(); });
       });
   search_neighbours(model, w);
   for (const Index side : w.sides) {

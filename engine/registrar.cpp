@@ -223,6 +223,7 @@ Status run(const ModelData& model, const Options& options, const Input inputs[2]
   if (!finite(pose) || !finite(coarse_pose)) return Status::degenerate;
 
   const Residual residual = measure_residual(transform, w);
+  if (w.deadline.passed()) return give_up(&transform, scale, w, result);
   result.has_pose = true;
   result.T_target_source = pose;
   result.T_target_source_coarse = coarse_pose;

@@ -58,14 +58,17 @@ SpatialIndex::SpatialIndex(Index max_points) {
   }
 }
 
-void SpatialIndex::build(const Coordinates& points, Index count) noexcept {
+void SpatialIndex::take(const Coordinates& points, Index count) noexcept {
   count_ = count;
-  Item* items = items_.data();
   for (Index i = 0; i < count; ++i) {
-    items[i] = {{points.x[i], points.y[i], points.z[i]}, static_cast<std::uint32_t>(i)};
+    items_[static_cast<std::size_t>(i)] = {{points.x[i], points.y[i], points.z[i]},
+                                           static_cast<std::uint32_t>(i)};
   }
-  split(0, count);
-  for (Index i = 0; i < count; ++i) {
+}
+
+void SpatialIndex::store() noexcept {
+  const Item* items = items_.data();
+  for (Index i = 0; i < count_; ++i) {
     const auto at = static_cast<std::size_t>(i);
     x_[at] = items[i].position[0];
     y_[at] = items[i].position[1];
@@ -73,17 +76,15 @@ void SpatialIndex::build(const Coordinates& points, Index count) noexcept {
     original_[at] = items[i].original;
   }
   store_boxes();
-  for (auto i = static_cast<std::size_t>(count); i < static_cast<std::size_t>(leaves() * leaf_size);
-       ++i) {
+  for (auto i = static_cast<std::size_t>(count_);
+       i < static_cast<std::size_t>(leaves() * leaf_size); ++i) {
     x_[i] = y_[i] = z_[i] = beyond;
     original_[i] = std::numeric_limits<std::uint32_t>::max();
   }
 }
 
-/// Halves [first, last) at a leaf boundary across the longest side of its box, down to single
-/// leaves.
-void SpatialIndex::split(Index first, Index last) noexcept {
-  if (last - first <= leaf_size) return;
+/// Halves [first, last) at a leaf boundary, which it returns, across the longest side of its box.
+Index SpatialIndex::halve(Index first, Index last) noexcept {
   Item* items = items_.data();
   Index widest = 0;
   float widest_side = -1.0f;
@@ -104,6 +105,13 @@ void SpatialIndex::split(Index first, Index last) noexcept {
   std::nth_element(
       items + first, items + middle, items + last,
       [widest](const Item& a, const Item& b) { return a.position[widest] < b.position[widest]; });
+  return middle;
+}
+
+/// Halves [first, last) down to single leaves.
+void SpatialIndex::split(Index first, Index last) noexcept {
+  if (last - first <= leaf_size) return;
+  const Index middle = halve(first, last);
   split(first, middle);
   split(middle, last);
 }

@@ -38,7 +38,15 @@ class SpatialIndex {
   explicit SpatialIndex(Index max_points);
 
   /// Orders `count` (1 to max_points) finite points with squares far below the largest float.
-  void build(const Coordinates& points, Index count) noexcept;
+  void build(const Coordinates& points, Index count) noexcept {
+    build(points, count, [] { return false; });
+  }
+  /// The same, asking about every half millisecond whether to stop; what is left then is no index.
+  template <class Stop>
+  void build(const Coordinates& points, Index count, const Stop& stop) noexcept {
+    take(points, count);
+    if (split(0, count, stop)) store();
+  }
 
   Index count() const noexcept { return count_; }
   Index leaves() const noexcept { return (count_ + leaf_size - 1) / leaf_size; }
@@ -62,8 +70,25 @@ class SpatialIndex {
     std::uint32_t original;
   };
 
+  /// A piece of work between two questions.
+  static constexpr Index points_at_once = 2048;
+
+  void take(const Coordinates& points, Index count) noexcept;
+  Index halve(Index first, Index last) noexcept;
   void split(Index first, Index last) noexcept;
+  void store() noexcept;
   void store_boxes() noexcept;
+
+  /// False when it was stopped.
+  template <class Stop>
+  bool split(Index first, Index last, const Stop& stop) noexcept {
+    if (last - first <= points_at_once) {
+      split(first, last);
+      return !stop();
+    }
+    const Index middle = halve(first, last);
+    return !stop() && split(first, middle, stop) && split(middle, last, stop);
+  }
 
   Index count_ = 0;
   std::vector<Item> items_;
