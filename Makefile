@@ -13,7 +13,8 @@ DEBIAN := cmake ninja-build ccache g++ libeigen3-dev catch2 libcli11-dev nlohman
 PEERS_DEBIAN := libusb-1.0-0 libgl1 libegl1 libidn2-0
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
-.PHONY: help test-data setup debian-packages build python demo test test-cpp test-python check sanitize \
+.PHONY: help test-data setup debian-packages build python demo test test-cpp test-python test-isa soak \
+        check sanitize \
         bench bench-compare evaluate train train-paper data model docs wheel clean
 
 help: ## this list
@@ -51,12 +52,20 @@ test-cpp: build
 test-python: python build test-data
 	$(PY) -m pytest -q tests/python
 
+test-isa: setup ## the tests that run the engine, on every instruction set of this processor
+	@command -v qemu-x86_64 > /dev/null || { $(SUDO) apt-get update -q && \
+	  $(SUDO) apt-get install -y -q --no-install-recommends qemu-user; }
+	PYTHON=$(abspath $(PY)) tests/isa/run_suites.sh $(abspath build/isa) $(LEVELS)
+
+soak: build ## 100,000 aligns without growth; 1,000 frames at 30 Hz without a missed deadline
+	tests/consumers/soak.sh build/$(PRESET) $(abspath build/soak)
+
 test-data: setup ## the test split of the furniture models, surfaces only
 	$(PY) -m vnreg_train.cli build-data --splits test --no-occupancy
 
 check: setup ## formatting, lints, types
-	$(PY) -m ruff check train_py python tests/python bench examples
-	$(PY) -m ruff format --check train_py python tests/python bench examples
+	$(PY) -m ruff check train_py python tests/python bench examples docs
+	$(PY) -m ruff format --check train_py python tests/python bench examples docs
 	$(PY) -m mypy train_py/vnreg_train
 
 sanitize: debian-packages ## the C++ tests under address and undefined-behaviour sanitizers
