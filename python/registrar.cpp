@@ -164,11 +164,10 @@ void bind_prepared_cloud(nb::module_& module) {
   nb::class_<PreparedCloud>(
       module, "PreparedCloud",
       "A cloud with all that can be computed of it alone, made by Registrar.prepare(). Immutable,\n"
-      "may be shared by threads and registrars. Give it to align in place of the array: the "
-      "answer\n"
-      "is the same where its r.m.s. radius is the larger one of the pair; up to 1.25 times it, "
-      "the\n"
-      "other cloud is measured in its unit.")
+      "may be shared by threads and registrars. Give it to align in place of the array: the\n"
+      "answer is the same where its r.m.s. radius is the larger one of the pair. Where the other\n"
+      "cloud's is larger by up to a quarter, that cloud is measured in this one's unit; beyond,\n"
+      "this one is computed again.")
       .def_prop_ro(
           "status", [](const PreparedCloud& p) { return to_string(p.status()); },
           "'ok', or why no pose is found with it: 'too_few_points', 'not_finite', 'degenerate',\n"
@@ -192,8 +191,8 @@ void bind_registrar_class(nb::module_& module) {
       module, "Registrar",
       "Aligns pairs of clouds with one model; keeps its working memory between calls.\n\n"
       "mode: 'verified' (many poses, judged by how well they explain both clouds, and refined),\n"
-      "'paper' (coarse, then fine register), or 'coarse' (it alone).\n"
-      "threads: 0 means what OpenMP says.\n"
+      "'paper' (the coarse register, then the fine one), or 'coarse' (the coarse one alone).\n"
+      "threads: that one call works with; 0 means what OpenMP says, as a rule one per processor.\n"
       "max_points: larger clouds are subsampled to so many, 64 to 16384; 0 means model.points.\n"
       "seed: of the subsampling. record_stages: keep every activation for stages().\n"
       "time_budget_ms: after it align returns with status 'timed_out'; 0 means no limit.\n"

@@ -1,7 +1,7 @@
 #!/bin/bash
 # check_wheel.sh WHEEL FOLDER: what the wheel promises. It is small, needs numpy only, works from a clean
-# virtual environment within 15 seconds, carries three builds of the library that agree with each other,
-# and its baseline has no instruction beyond x86-64-v2.
+# virtual environment within 15 seconds, and carries three builds of the library that agree with each
+# other. Its baseline has no instruction beyond x86-64-v2, and its name says which Pythons it serves.
 set -euo pipefail
 wheel=$(realpath "$1") folder=$2
 here=$(realpath "$(dirname "$0")")
@@ -14,6 +14,13 @@ fail() {
 rm -rf "$folder"
 mkdir -p "$folder"
 cd "$folder"
+# One wheel serves every version from 3.12 on; older ones lack what that takes.
+tag=$(python3 -c 'import sys; v = "cp3%d" % sys.version_info[1]
+print("cp312-abi3" if sys.version_info >= (3, 12) else v + "-" + v)')
+case $(basename "$wheel") in
+  vnreg-*-"$tag"-linux_x86_64.whl) ;;
+  *) fail "$wheel: not tagged $tag" ;;
+esac
 [ "$(stat -c %s "$wheel")" -lt 10000000 ] || fail "the wheel has 10 MB or more"
 python3 -m zipfile -e "$wheel" content
 
