@@ -13,10 +13,16 @@ namespace {
 bool processor_fits() noexcept {
 #if defined(__x86_64__)
   __builtin_cpu_init();
+  const bool v2 = __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
+  const bool v3 = v2 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+                  __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
+  const bool v4 = v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+                  __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+                  __builtin_cpu_supports("avx512vl");
   const std::string_view level = compiled_level;
-  if (level == "x86-64-v4") return __builtin_cpu_supports("x86-64-v4") != 0;
-  if (level == "x86-64-v3") return __builtin_cpu_supports("x86-64-v3") != 0;
-  if (level == "x86-64-v2") return __builtin_cpu_supports("x86-64-v2") != 0;
+  if (level == "x86-64-v4") return v4;
+  if (level == "x86-64-v3") return v3;
+  if (level == "x86-64-v2") return v2;
 #endif
   return true;
 }
