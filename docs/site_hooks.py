@@ -50,7 +50,8 @@ def run_doxygen(folder: Path, headers: Path = ROOT / "engine/include") -> None:
     folder.mkdir(parents=True, exist_ok=True)
     settings = (ROOT / "docs/doxygen/Doxyfile").read_text(encoding="utf-8")
     settings += f"OUTPUT_DIRECTORY = {folder}\nGENERATE_TAGFILE = {folder / 'vnreg.tag'}\n"
-    settings += f"INPUT = {headers / 'vnreg'} docs/doxygen/main.md\nSTRIP_FROM_PATH = {headers}\n"
+    settings += f"INPUT = {headers / 'vnreg'} docs/doxygen/main.md\n"
+    settings += f"STRIP_FROM_PATH = {headers}\nSTRIP_FROM_INC_PATH = {headers}\n"
     done = subprocess.run(
         ["doxygen", "-"], cwd=ROOT, input=settings, capture_output=True, text=True, check=False
     )

@@ -256,6 +256,11 @@ def test_the_reference_tells_every_public_name(site: Path) -> None:
         assert f'id="{name.lower()}"' in reference
 
 
+def test_the_reference_says_what_to_include(site: Path) -> None:
+    page = (site / "api/classvnreg_1_1Registrar.html").read_text(encoding="utf-8")
+    assert "vnreg/vnreg.hpp" in page.split("#include")[1].split("</code>")[0]
+
+
 def names_in_the_headers_reference(site: Path) -> set[str]:
     """Qualified names, of classes and of the members of everything."""
     names = set()
