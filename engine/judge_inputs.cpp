@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "engine/verify.hpp"
+#include <span>
 
 namespace vnreg::detail {
 namespace {
@@ -44,7 +43,8 @@ bool find_encoded(const Surface& s, float radius, const CloudDescriptors& d, Dea
 /// The first points of the progressive order that have descriptors of their own.
 void choose_points(const Surface& s, const CloudDescriptors& d, JudgedCloud& c) noexcept {
   Index count = 0;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(s.count) && count < judged_points; ++i) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(s.count) && count < most_judged_points;
+       ++i) {
     const std::uint16_t encoded = c.nearest_encoded[i];
     if (d.encoded[encoded] != s.origin[i]) continue;
     const auto to = static_cast<std::size_t>(count++);
@@ -127,14 +127,24 @@ struct View {
   float radius;
 };
 
+/// A judged point: the match at `at` of its block is its own.
+struct MatchedPoint {
+  const Matches& block;
+  std::size_t at;
+  std::size_t judged;
+};
+
 /// Distance, heights over both planes, normals, and whether the other cloud should show the point.
-void write_geometry(const View& v, const Matches& m, const HalfSpace& cut, std::size_t i,
+void write_geometry(const View& v, const MatchedPoint& point, const HalfSpace& cut,
                     Writer& put) noexcept {
+  const Matches& m = point.block;
+  const std::size_t i = point.at;
   const float h = v.spacing;
   const Vector off{m.x[i] - m.nearest_x[i], m.y[i] - m.nearest_y[i], m.z[i] - m.nearest_z[i]};
   const Vector normal{m.normal_x[i], m.normal_y[i], m.normal_z[i]};
   const Surface& p = v.moving.points;
-  const Vector own = turn(v.motion.rotation, {p.normal_x[i], p.normal_y[i], p.normal_z[i]});
+  const std::size_t j = point.judged;
+  const Vector own = turn(v.motion.rotation, {p.normal_x[j], p.normal_y[j], p.normal_z[j]});
   const float distance = std::sqrt(m.squared[i]) / h;
   const float height = std::abs(dot(off, normal)) / h;
   const float cosine = std::abs(dot(own, normal));
@@ -149,15 +159,16 @@ void write_geometry(const View& v, const Matches& m, const HalfSpace& cut, std::
 }
 
 /// What lies around the place, in the point's own cloud and in the other one.
-void write_surroundings(const View& v, const Matches& m, std::size_t i, float* leaf_bounds,
+void write_surroundings(const View& v, const MatchedPoint& point, float* leaf_bounds,
                         Writer& put) noexcept {
   using RowMajor3f = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
   const Eigen::Matrix3f rotation = Eigen::Map<const RowMajor3f>(v.motion.rotation);
-  const float place[3] = {m.x[i], m.y[i], m.z[i]};
+  const Matches& m = point.block;
+  const float place[3] = {m.x[point.at], m.y[point.at], m.z[point.at]};
   Surroundings there[surroundings_radii];
   kernels::surroundings(v.fixed_surface.index, place, radii, leaf_bounds, there);
   for (std::size_t r = 0; r < static_cast<std::size_t>(surroundings_radii); ++r) {
-    const Surroundings& here = v.moving.own[i][r];
+    const Surroundings& here = v.moving.own[point.judged][r];
     const Eigen::Vector3f a = rotation * Eigen::Map<const Eigen::Vector3f>(here.offset);
     const Eigen::Vector3f b = Eigen::Map<const Eigen::Vector3f>(there[r].offset);
     const Eigen::Matrix3f spread =
@@ -176,10 +187,12 @@ void write_surroundings(const View& v, const Matches& m, std::size_t i, float* l
 }
 
 /// How alike the network finds the point and what lies at its place.
-void write_descriptors(const View& v, const Matches& m, std::size_t i, Writer& put) noexcept {
+void write_descriptors(const View& v, const MatchedPoint& point, Writer& put) noexcept {
+  const Matches& m = point.block;
+  const std::size_t i = point.at;
   const CloudDescriptors& a = v.moving_descriptors;
   const CloudDescriptors& b = v.fixed_descriptors;
-  const std::size_t p = v.moving.encoded[i];
+  const std::size_t p = v.moving.encoded[point.judged];
   const std::size_t q = v.fixed.nearest_encoded[m.place[i]];
   const float local = inner_product(a.local, p, b.local, q, a.local_stride);
   const float context = inner_product(a.context, p, b.context, q, a.context_stride);
@@ -206,28 +219,41 @@ void write_pair(const View& v, Writer& put) noexcept {
 }
 
 /// The half-space in which most of the points without a match lie.
-HalfSpace cut_off(const Matches& m, float limit, const Extents& extents) noexcept {
-  float x[judged_points], y[judged_points], z[judged_points];
+HalfSpace cut_off(std::span<const Matches> found, float limit, const Extents& extents) noexcept {
+  float x[most_judged_points], y[most_judged_points], z[most_judged_points];
   Index count = 0;
-  for (Index i = 0; i < m.count; ++i) {
-    if (!(m.squared[i] > limit * limit)) continue;
-    x[count] = m.x[i];
-    y[count] = m.y[i];
-    z[count++] = m.z[i];
+  for (const Matches& m : found) {
+    for (Index i = 0; i < m.count; ++i) {
+      if (!(m.squared[i] > limit * limit)) continue;
+      x[count] = m.x[i];
+      y[count] = m.y[i];
+      z[count++] = m.z[i];
+    }
   }
   return most_beyond({x, y, z}, count, extents);
 }
 
-void write_side(const View& v, float* leaf_bounds, float* out) noexcept {
-  Matches matches;
-  match_points(v.motion, v.moving.points, 0, v.moving.points.count, v.fixed_surface, Search::exact,
-               matches);
-  const HalfSpace cut = cut_off(matches, unmatched_distance * v.spacing, v.fixed_surface.extents);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(matches.count); ++i) {
-    Writer put(out + static_cast<Index>(i) * kernels::padded(judge_point_inputs));
-    write_geometry(v, matches, cut, i, put);
-    write_surroundings(v, matches, i, leaf_bounds, put);
-    write_descriptors(v, matches, i, put);
+/// Matches the first `count` judged points, as many at once as Matches holds.
+std::span<const Matches> match_judged(const View& v, Index count,
+                                      std::vector<Matches>& room) noexcept {
+  std::size_t blocks = 0;
+  for (Index first = 0; first < count; first += Matches::capacity) {
+    match_points(v.motion, v.moving.points, first, std::min(count - first, Matches::capacity),
+                 v.fixed_surface, Search::exact, room[blocks++]);
+  }
+  return {room.data(), blocks};
+}
+
+void write_side(const View& v, Index count, JudgeScratch& s, float* out) noexcept {
+  const std::span<const Matches> found = match_judged(v, count, s.matches);
+  const HalfSpace cut = cut_off(found, unmatched_distance * v.spacing, v.fixed_surface.extents);
+  for (std::size_t point = 0; point < static_cast<std::size_t>(count); ++point) {
+    constexpr auto block = static_cast<std::size_t>(Matches::capacity);
+    const MatchedPoint p{found[point / block], point % block, point};
+    Writer put(out + static_cast<Index>(point) * kernels::padded(judge_point_inputs));
+    write_geometry(v, p, cut, put);
+    write_surroundings(v, p, s.leaf_bounds.data(), put);
+    write_descriptors(v, p, put);
     write_pair(v, put);
   }
 }
@@ -236,34 +262,43 @@ void write_side(const View& v, float* leaf_bounds, float* out) noexcept {
 
 void choose_judged_points(Workspace& w) noexcept {
   VerifiedWorkspace& v = w.verified;
-  parallel_for(w.threads, 2, [&](Index side, int thread) {
+  parallel_for(w.threads, 2, [&](Index side, int) {
     const Surface& s = v.surface[side];
     const CloudDescriptors& d = w.descriptors.features[side].out;
     JudgedCloud& c = v.judge.cloud[side];
     if (!find_encoded(s, static_cast<float>(v.radius), d, w.deadline, c)) return;
     choose_points(s, d, c);
     set_log_sums(side == 0 ? v.match.row_sum : v.match.column_sum, d.count, v.match.largest, c);
+  });
+}
+
+void describe_judged_points(Index first, Index last, Workspace& w) noexcept {
+  VerifiedWorkspace& v = w.verified;
+  parallel_for(w.threads, 2, [&](Index side, int thread) {
+    JudgedCloud& c = v.judge.cloud[side];
     float* bounds = v.judge.scratch[static_cast<std::size_t>(thread)].leaf_bounds.data();
-    for (std::size_t i = 0; i < static_cast<std::size_t>(c.points.count); ++i) {
+    const auto end = static_cast<std::size_t>(std::min(last, c.points.count));
+    for (auto i = static_cast<std::size_t>(first); i < end; ++i) {
       if (i % 16 == 0 && w.deadline.passed()) return;
       const float place[3] = {c.points.x[i], c.points.y[i], c.points.z[i]};
-      kernels::surroundings(s.index, place, radii, bounds, c.own[i]);
+      kernels::surroundings(v.surface[side].index, place, radii, bounds, c.own[i]);
     }
   });
 }
 
-Index write_judge_inputs(const Motion& motion, const Workspace& w, JudgeScratch& s) noexcept {
+Index write_judge_inputs(const Motion& motion, Index most, const Workspace& w,
+                         JudgeScratch& s) noexcept {
   const VerifiedWorkspace& v = w.verified;
   const Motion back = inverse(motion);
   Index columns = 0;
   for (Index side = 0; side < 2; ++side) {
     const Index other = 1 - side;
+    const Index count = std::min(most, v.judge.cloud[side].points.count);
     write_side({side == 0 ? motion : back, v.judge.cloud[side], v.judge.cloud[other],
                 v.surface[side], v.surface[other], w.descriptors.features[side].out,
                 w.descriptors.features[other].out, v.spacing, static_cast<float>(v.radius)},
-               s.leaf_bounds.data(),
-               s.inputs.data() + columns * kernels::padded(judge_point_inputs));
-    columns += v.judge.cloud[side].points.count;
+               count, s, s.inputs.data() + columns * kernels::padded(judge_point_inputs));
+    columns += count;
   }
   return columns;
 }

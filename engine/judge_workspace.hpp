@@ -6,18 +6,21 @@
 
 #include "engine/judge_model.hpp"
 #include "engine/surface.hpp"
+#include "engine/verify.hpp"
 #include "kernels/surroundings.hpp"
 
 namespace vnreg::detail {
 
-/// Points of each cloud that the judge looks at.
+/// Points of each cloud that the judge looks at: of every pose, and of those between which it
+/// is hard to choose.
 inline constexpr Index judged_points = 64;
+inline constexpr Index most_judged_points = 256;
 
 /// The judged points of one cloud, and what is known of them whatever the pose.
 struct JudgedCloud {
-  Surface points;                             // places and normals only
-  std::uint16_t encoded[judged_points] = {};  // which descriptor is theirs
-  kernels::Surroundings own[judged_points][kernels::surroundings_radii];
+  Surface points;                                  // places and normals only
+  std::uint16_t encoded[most_judged_points] = {};  // which descriptor is theirs
+  kernels::Surroundings own[most_judged_points][kernels::surroundings_radii];
   std::vector<std::uint16_t> nearest_encoded;  // of every point of the cloud's surface
   kernels::Floats log_sum;  // per encoded point: log of the sum of exp(similarity) over the others
 
@@ -28,8 +31,9 @@ struct JudgedCloud {
 /// What one thread needs while it judges one pose.
 struct JudgeScratch {
   kernels::Floats leaf_bounds;
-  kernels::Floats inputs;     // a column per judged point, source first
-  kernels::Floats hidden[2];  // of the same points
+  std::vector<Matches> matches;  // of one cloud's judged points
+  kernels::Floats inputs;        // a column per judged point, source first
+  kernels::Floats hidden[2];     // of the same points
   kernels::Floats pose_inputs, pose_hidden, logit;
 };
 

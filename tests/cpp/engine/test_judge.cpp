@@ -39,17 +39,19 @@ void make_ready(PreparedPair& pair) {
   pair.describe();
   detail::propose_from_matches(pair.workspace());
   detail::choose_judged_points(pair.workspace());
+  detail::describe_judged_points(0, detail::most_judged_points, pair.workspace());
 }
 
-Judged inputs_at(PreparedPair& pair, const detail::Motion& motion) {
+Judged inputs_at(PreparedPair& pair, const detail::Motion& motion,
+                 detail::Index most = detail::most_judged_points) {
   detail::Workspace& w = pair.workspace();
   detail::JudgeScratch& s = w.verified.judge.scratch[0];
-  const detail::Index columns = detail::write_judge_inputs(motion, w, s);
-  const auto& clouds = w.verified.judge.cloud;
-  Judged out{{},
-             static_cast<std::size_t>(clouds[0].points.count),
-             static_cast<std::size_t>(clouds[1].points.count)};
-  REQUIRE(columns == clouds[0].points.count + clouds[1].points.count);
+  const detail::Index columns = detail::write_judge_inputs(motion, most, w, s);
+  const auto points_of = [&](const detail::JudgedCloud& cloud) {
+    return static_cast<std::size_t>(std::min(most, cloud.points.count));
+  };
+  Judged out{{}, points_of(w.verified.judge.cloud[0]), points_of(w.verified.judge.cloud[1])};
+  REQUIRE(static_cast<std::size_t>(columns) == out.points());
   for (detail::Index c = 0; c < columns; ++c) {
     const float* column = s.inputs.data() + c * kernels::padded(detail::judge_point_inputs);
     out.inputs.insert(out.inputs.end(), column, column + detail::judge_point_inputs);
@@ -99,6 +101,29 @@ TEST_CASE("swapped clouds and the inverse pose swap the inputs") {
   }
 }
 
+TEST_CASE("a look at few points sees the first of them") {
+  Random random(265);
+  const Eigen::Isometry3d truth = random_motion(random, 2);
+  const Points source = shape(800, random);
+  PreparedPair pair(source, moved(source, truth));
+  make_ready(pair);
+  const detail::Motion motion = pair.surface_motion(truth);
+  const Judged every = inputs_at(pair, motion);
+  for (const detail::Index most : {1, 63, 64, 65, 200}) {
+    const Judged few = inputs_at(pair, motion, most);
+    REQUIRE(few.source_points == static_cast<std::size_t>(most));
+    REQUIRE(few.target_points == static_cast<std::size_t>(most));
+    for (std::size_t i = 0; i < few.points(); ++i) {
+      const std::size_t same =
+          i < few.source_points ? i : every.source_points + i - few.source_points;
+      for (std::size_t k = 0; k < static_cast<std::size_t>(detail::judge_point_inputs); ++k) {
+        CAPTURE(i, k);
+        REQUIRE(few.at(i, k) == every.at(same, k));
+      }
+    }
+  }
+}
+
 TEST_CASE("poses that lay the clouds far apart have finite inputs") {
   Random random(263);
   const Points source = shape(200, random), target = shape(130, random);
@@ -128,7 +153,7 @@ TEST_CASE("the judged points have descriptors of their own, and the pair's noise
   const detail::Workspace& w = pair.workspace();
   for (std::size_t side = 0; side < 2; ++side) {
     const detail::JudgedCloud& c = w.verified.judge.cloud[side];
-    REQUIRE(c.points.count == detail::judged_points);
+    REQUIRE(c.points.count == detail::most_judged_points);
     const detail::CloudDescriptors& d = w.descriptors.features[side].out;
     const auto unit = static_cast<float>(w.verified.radius);
     for (std::size_t i = 0; i < static_cast<std::size_t>(c.points.count); ++i) {

@@ -10,8 +10,8 @@ import torch
 
 import vnreg
 from vnreg_train.model_file import read_model
-from vnreg_train.networks.judge import POINT_INPUTS, POINTS, JudgeNetwork
-from vnreg_train.training.judge_samples import MOST_POSES, JudgeSamples
+from vnreg_train.networks.judge import FIRST_POINTS, MOST_POINTS, POINT_INPUTS, JudgeNetwork
+from vnreg_train.training.judge_samples import KEPT_POINTS, MOST_POSES, JudgeSamples
 from vnreg_train.training.judge_train import (
     KEY,
     JudgeTraining,
@@ -33,7 +33,7 @@ def random_judge(seed: int, hidden: int = 12) -> JudgeNetwork:
 def samples(pairs: int, seed: int) -> JudgeSamples:
     """Poses of which those with a small first input are right; some pairs have fewer, or none."""
     rng = np.random.default_rng(seed)
-    points = rng.normal(0, 1, (pairs, MOST_POSES, 2 * POINTS, POINT_INPUTS))
+    points = rng.normal(0, 1, (pairs, MOST_POSES, 2 * KEPT_POINTS, POINT_INPUTS))
     there = np.arange(MOST_POSES) < rng.integers(1, MOST_POSES + 1, (pairs, 1))
     right = there & (rng.random((pairs, MOST_POSES)) < 0.25)
     points[..., 0] += np.where(right, -0.5, 0.5)[..., None]
@@ -55,7 +55,7 @@ def cloud(count: int, seed: int) -> np.ndarray:
 def test_folded_tensors_are_the_same_network() -> None:
     network = random_judge(3)
     again = JudgeNetwork.from_tensors(network.tensors()).eval()
-    points, fit = torch.randn(5, 2 * POINTS, POINT_INPUTS), torch.randn(5)
+    points, fit = torch.randn(5, 2 * FIRST_POINTS, POINT_INPUTS), torch.randn(5)
     with torch.no_grad():
         torch.testing.assert_close(again(points, fit), network(points, fit), rtol=1e-4, atol=1e-4)
 
@@ -111,6 +111,24 @@ def test_write_replaces_the_judge_alone(tmp_path: Path) -> None:
     )
 
 
+DOUBT = 6.0  # below the best log-odds: poses that the engine looks at closer
+
+
+def torch_log_odds(
+    judge: JudgeNetwork, inputs: np.ndarray, fit: np.ndarray, most: int
+) -> np.ndarray:
+    """By the first `most` points of each cloud; inputs (K, P, 33) have as many of both."""
+    half = inputs.shape[1] // 2
+    first = np.arange(min(most, half))
+    chosen = torch.from_numpy(inputs[:, np.concatenate([first, half + first])])
+    with torch.no_grad():
+        return judge(chosen, torch.from_numpy(fit)).numpy()
+
+
+def assert_close(got: np.ndarray, expected: np.ndarray) -> None:
+    assert np.abs(got - expected).max() <= 1e-4 * max(1.0, np.abs(expected).max())
+
+
 @pytest.mark.parametrize("count", [40, 300, 1024])
 def test_engine_and_torch_judge_alike(tmp_path: Path, count: int) -> None:
     path = tmp_path / "judged.vnr"
@@ -126,10 +144,15 @@ def test_engine_and_torch_judge_alike(tmp_path: Path, count: int) -> None:
     inputs = np.asarray(stages["judge.inputs"], np.float32).reshape(len(fit), -1, POINT_INPUTS)
     assert np.isfinite(inputs).all()
     judge = JudgeNetwork.from_tensors(read_model(path)[1])
-    with torch.no_grad():
-        expected = judge(torch.from_numpy(inputs), torch.from_numpy(fit)).numpy()
-    got = np.asarray(stages["judge.log_odds"])
-    assert np.abs(got - expected).max() <= 1e-4 * max(1.0, np.abs(expected).max())
+    first = torch_log_odds(judge, inputs, fit, FIRST_POINTS)
+    assert_close(np.asarray(stages["judge.first_log_odds"]).ravel(), first)
+    closer = torch_log_odds(judge, inputs, fit, MOST_POINTS)
+    expected = first.copy()
+    close = [i for i in np.argsort(-first)[:4] if first[i] > first.max() - DOUBT]
+    if len(close) > 1:
+        expected = np.minimum(first, closer[close].min())
+        expected[close] = closer[close]
+    assert_close(np.asarray(stages["judge.log_odds"]).ravel(), expected)
 
 
 def test_engine_refuses_a_judge_of_another_shape(tmp_path: Path) -> None:

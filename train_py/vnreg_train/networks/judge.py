@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 POINT_INPUTS = 33
-POINTS = 64  # of each cloud
+# Points of each cloud: of every pose, and of the best few between which it is hard to choose.
+FIRST_POINTS = 64
+MOST_POINTS = 256
 # Columns of the point inputs that the pose is told too.
 SPACING = 30
 NOISE = (28, 29)

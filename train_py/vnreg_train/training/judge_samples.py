@@ -17,16 +17,17 @@ from vnreg_train.evaluate.pairs import row_pairs, split_shapes
 from vnreg_train.evaluate.rows import ROWS
 from vnreg_train.evaluate.scores import LIMITS
 from vnreg_train.evaluate.symmetry import TRIVIAL, SymmetryGroup
-from vnreg_train.networks.judge import POINT_INPUTS, POINTS
+from vnreg_train.networks.judge import POINT_INPUTS
 
 MOST_POSES = 12  # that the engine hands to its judge
+KEPT_POINTS = 128  # of each cloud, of the judge's 256: more would fill the memory for nothing
 
 
 @dataclass(frozen=True)
 class JudgeSamples:
     """Of N pairs: the poses in the judge's hands. Where a pair has fewer, `there` is False."""
 
-    points: NDArray[np.float16]  # (N, 12, 128, 33)
+    points: NDArray[np.float16]  # (N, 12, 256, 33): KEPT_POINTS of the source, of the target
     fit: NDArray[np.float32]  # (N, 12)
     right: NDArray[np.bool_]  # (N, 12): up to the shape's symmetry
     there: NDArray[np.bool_]  # (N, 12)
@@ -90,14 +91,19 @@ def _right(pair: Pair, poses: Float64, group: SymmetryGroup) -> NDArray[np.bool_
 
 def _padded(found: Sequence[tuple[Float64, Float64, NDArray[np.bool_]]]) -> JudgeSamples:
     count = len(found)
-    points = np.zeros((count, MOST_POSES, 2 * POINTS, POINT_INPUTS), np.float16)
+    points = np.zeros((count, MOST_POSES, 2 * KEPT_POINTS, POINT_INPUTS), np.float16)
     fit = np.zeros((count, MOST_POSES), np.float32)
     right, there = np.zeros((2, count, MOST_POSES), bool)
     for i, (inputs, scores, correct) in enumerate(found):
         poses = len(scores)
         values = inputs.reshape(poses, -1, POINT_INPUTS)
-        # Clouds of few points: their points count several times.
-        chosen = np.arange(2 * POINTS) * values.shape[1] // (2 * POINTS)
-        points[i, :poses] = values[:, chosen]
+        points[i, :poses] = values[:, _kept(values.shape[1])]
         fit[i, :poses], right[i, :poses], there[i, :poses] = scores, correct, True
     return JudgeSamples(points, fit, right, there)
+
+
+def _kept(points: int) -> NDArray[np.int_]:
+    """The first of either cloud's half; of clouds with few points, each several times."""
+    half = points // 2
+    first = np.arange(KEPT_POINTS) % half
+    return np.concatenate([first, points - half + first])

@@ -17,8 +17,8 @@ from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from tqdm import trange
 
 from vnreg_train.model_file import MetadataValue, read_model, write_model
-from vnreg_train.networks.judge import POINTS, JudgeNetwork
-from vnreg_train.training.judge_samples import JudgeSamples
+from vnreg_train.networks.judge import JudgeNetwork
+from vnreg_train.training.judge_samples import KEPT_POINTS, JudgeSamples
 
 KEY = "channels.judge"
 # What the judge has to decide on: every row of P1 and of views, and the paper's with its shared
@@ -83,7 +83,8 @@ def train_judge(
     schedule = OneCycleLR(optimizer, settings.learning_rate, settings.steps, pct_start=0.1)
     for _ in trange(settings.steps, desc="judge", disable=not progress):
         pairs = torch.randint(0, len(samples), (settings.batch,))
-        chosen = torch.cat([s * POINTS + torch.randperm(POINTS)[: settings.points] for s in (0, 1)])
+        drawn = [torch.randperm(KEPT_POINTS)[: settings.points] for _ in range(2)]
+        chosen = torch.cat([drawn[0], KEPT_POINTS + drawn[1]])
         z = network(points[pairs][:, :, chosen].float(), fit[pairs])
         loss = judge_loss(z, right[pairs], there[pairs])
         optimizer.zero_grad()
