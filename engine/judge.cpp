@@ -101,6 +101,8 @@ void record(const ScoredPose* poses, const double* first, const double* judged, 
   }
   w.recorder.matrix("judge.", "poses", rows, numbers, numbers, count);
   w.recorder.list("judge.", "fit", fits, count);
+  const auto source_points = static_cast<float>(judge.cloud[0].points.count);
+  w.recorder.list("judge.", "source_points", &source_points, 1);
   if (judge.model != nullptr) {
     w.recorder.list("judge.", "first_log_odds", log_odds[0], count);
     w.recorder.list("judge.", "log_odds", log_odds[1], count);

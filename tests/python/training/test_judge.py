@@ -115,14 +115,14 @@ DOUBT = 6.0  # below the best log-odds: poses that the engine looks at closer
 
 
 def torch_log_odds(
-    judge: JudgeNetwork, inputs: np.ndarray, fit: np.ndarray, most: int
+    judge: JudgeNetwork, inputs: np.ndarray, fit: np.ndarray, split: int, most: int
 ) -> np.ndarray:
-    """By the first `most` points of each cloud; inputs (K, P, 33) have as many of both."""
-    half = inputs.shape[1] // 2
-    first = np.arange(min(most, half))
-    chosen = torch.from_numpy(inputs[:, np.concatenate([first, half + first])])
+    """By the first `most` points of each cloud; of the inputs (K, P, 33) the first `split` are of
+    the source."""
+    points = np.arange(inputs.shape[1])
+    chosen = np.concatenate([points[:split][:most], points[split:][:most]])
     with torch.no_grad():
-        return judge(chosen, torch.from_numpy(fit)).numpy()
+        return judge(torch.from_numpy(inputs[:, chosen]), torch.from_numpy(fit)).numpy()
 
 
 def assert_close(got: np.ndarray, expected: np.ndarray) -> None:
@@ -144,9 +144,10 @@ def test_engine_and_torch_judge_alike(tmp_path: Path, count: int) -> None:
     inputs = np.asarray(stages["judge.inputs"], np.float32).reshape(len(fit), -1, POINT_INPUTS)
     assert np.isfinite(inputs).all()
     judge = JudgeNetwork.from_tensors(read_model(path)[1])
-    first = torch_log_odds(judge, inputs, fit, FIRST_POINTS)
+    split = int(stages["judge.source_points"].item())
+    first = torch_log_odds(judge, inputs, fit, split, FIRST_POINTS)
     assert_close(np.asarray(stages["judge.first_log_odds"]).ravel(), first)
-    closer = torch_log_odds(judge, inputs, fit, MOST_POINTS)
+    closer = torch_log_odds(judge, inputs, fit, split, MOST_POINTS)
     expected = first.copy()
     close = [i for i in np.argsort(-first)[:4] if first[i] > first.max() - DOUBT]
     if len(close) > 1:

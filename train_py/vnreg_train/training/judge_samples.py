@@ -59,7 +59,9 @@ def collect_samples(
                 np.asarray(stages[f"judge.{name}"], np.float64)
                 for name in ("inputs", "fit", "poses")
             )
-            found.append((inputs, fit, _right(pair, poses, group)))
+            kept = _kept(int(stages["judge.source_points"].item()), len(inputs) // len(fit))
+            points = inputs.reshape(len(fit), -1, POINT_INPUTS)[:, kept]
+            found.append((points, fit, _right(pair, poses, group)))
     return _padded(found)
 
 
@@ -96,14 +98,12 @@ def _padded(found: Sequence[tuple[Float64, Float64, NDArray[np.bool_]]]) -> Judg
     right, there = np.zeros((2, count, MOST_POSES), bool)
     for i, (inputs, scores, correct) in enumerate(found):
         poses = len(scores)
-        values = inputs.reshape(poses, -1, POINT_INPUTS)
-        points[i, :poses] = values[:, _kept(values.shape[1])]
+        points[i, :poses] = inputs
         fit[i, :poses], right[i, :poses], there[i, :poses] = scores, correct, True
     return JudgeSamples(points, fit, right, there)
 
 
-def _kept(points: int) -> NDArray[np.int_]:
-    """The first of either cloud's half; of clouds with few points, each several times."""
-    half = points // 2
-    first = np.arange(KEPT_POINTS) % half
-    return np.concatenate([first, points - half + first])
+def _kept(source_points: int, points: int) -> NDArray[np.int_]:
+    """The first KEPT_POINTS of the source, then of the target; few points count several times."""
+    first = np.arange(KEPT_POINTS)
+    return np.concatenate([first % source_points, source_points + first % (points - source_points)])

@@ -47,7 +47,7 @@ class JudgeTraining:
     hidden: int = 48
     steps: int = 10000
     batch: int = 24  # pairs
-    points: int = 24  # of each cloud, drawn anew for every step
+    points: int = 96  # of each cloud, drawn anew for every step
     learning_rate: float = 3e-3
     weight_decay: float = 0.1
     average_decay: float = 0.99
