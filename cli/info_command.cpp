@@ -138,7 +138,7 @@ CLI::App* add_info_command(CLI::App& app, InfoArguments& arguments) {
 
 Outcome run_info(const InfoArguments& arguments) {
   try {
-    const auto bytes = model_format::FileBytes::open(arguments.model);
+    const auto bytes = model_format::read_file(arguments.model);
     const ModelFile file = ModelFile::parse(bytes.span());
     const Totals totals = totals_of(file, bytes.span().size());
     return {ExitCode::ok, arguments.json ? to_json(file, totals) : to_text(file, totals)};

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using model_format::DType;
-using model_format::FileBytes;
+using model_format::AlignedBytes;
 using model_format::ModelFile;
 using model_format::Tensor;
 
@@ -186,9 +186,9 @@ Outcome report(const ModelFile& golden, const std::vector<Stage>& stages,
 
 Outcome replay(const std::string& model_path, const std::string& golden_path) {
   const Model model = load_model(model_path);
-  const FileBytes model_bytes = FileBytes::open(model_path);
+  const AlignedBytes model_bytes = model_format::read_file(model_path);
   try {
-    const FileBytes bytes = FileBytes::open(golden_path);
+    const AlignedBytes bytes = model_format::read_file(golden_path);
     const ModelFile golden = ModelFile::parse(bytes.span());
     check_golden(golden, model_bytes.span());
     const auto source = input_cloud(golden, "input.source");

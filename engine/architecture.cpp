@@ -84,7 +84,9 @@ Index Architecture::min_points() const noexcept {
 Architecture read_architecture(const ModelFile& file) {
   Architecture a;
   const std::string arch = file.get_string("arch");
-  if (arch != "paper" && arch != "vnreg") refuse("arch", "paper or vnreg", arch);
+  if (arch != "paper" && arch != "vnreg") {
+    refuse("arch", "paper or vnreg", arch == "golden" ? arch : "another");
+  }
   a.family = arch == "paper" ? Family::paper : Family::vnreg;
   a.name = read_name(file);
   check_provenance(file);

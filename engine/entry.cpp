@@ -13,12 +13,11 @@
 namespace vnreg {
 
 using model_format::AlignedBytes;
-using model_format::FileBytes;
 using model_format::ModelFile;
 
 Model Model::load(const std::string& path) {
   detail::require_cpu();
-  const FileBytes bytes = FileBytes::open(path);
+  const AlignedBytes bytes = model_format::read_file(path);
   return Model(detail::read_model_data(ModelFile::parse(bytes.span())));
 }
 

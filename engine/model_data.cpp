@@ -8,6 +8,7 @@
 namespace vnreg::detail {
 namespace {
 
+using kernels::RowMajorMatrix;
 using model_format::ModelFile;
 
 /// Rows of a direction matrix: one per channel, or one for all.
@@ -33,9 +34,11 @@ kernels::VnBlockTensors read_block(TensorSet& tensors, const Architecture& arch,
 void read_encoder(TensorSet& tensors, ModelData& m) {
   const Architecture& a = m.arch;
   const Index c = a.channels_global;
+  // Tensors are asked for one after the other, never as arguments of one call, whose order is the
+  // compiler's choice: of two that are wrong, every build names the same.
+  const std::span<const float> pre = tensors.matrix("encoder.pre", 2 * c, 3);
   m.network0_first =
-      kernels::make_edge_block(tensors.matrix("encoder.pre", 2 * c, 3),
-                               read_block(tensors, a, "encoder.network0.0", 2 * c, c));
+      kernels::make_edge_block(pre, read_block(tensors, a, "encoder.network0.0", 2 * c, c));
   for (std::size_t i = 0; i < 2; ++i) {
     const std::string number = std::to_string(i);
     m.network0_rest[i] = kernels::make_vn_block(
@@ -57,16 +60,17 @@ void read_local_module(TensorSet& tensors, ModelData& m) {
     const std::string name = "local.invariant." + std::to_string(i);
     const Index in = i == 0 ? l : l / 2;
     const Index out = in / 2;
-    m.invariant[i] =
-        kernels::make_vn_norm_layer(tensors.dense(name + ".fc", out, in),
-                                    tensors.dense(name + ".direction", direction_rows(a, out), in),
-                                    tensors.vector(name + ".scale", out),
-                                    tensors.vector(name + ".shift", out), a.shared_direction);
+    const RowMajorMatrix fc = tensors.dense(name + ".fc", out, in);
+    const RowMajorMatrix direction = tensors.dense(name + ".direction", direction_rows(a, out), in);
+    const std::span<const float> scale = tensors.vector(name + ".scale", out);
+    const std::span<const float> shift = tensors.vector(name + ".shift", out);
+    m.invariant[i] = kernels::make_vn_norm_layer(fc, direction, scale, shift, a.shared_direction);
   }
   m.frame = tensors.packed("local.invariant.2.fc", 3, l / 4);
+  const RowMajorMatrix weight =
+      tensors.dense("local.descriptor.weight", a.channels_descriptor, 3 * l);
   m.descriptor = kernels::make_descriptor_layer(
-      tensors.dense("local.descriptor.weight", a.channels_descriptor, 3 * l),
-      tensors.vector("local.descriptor.bias", a.channels_descriptor), l);
+      weight, tensors.vector("local.descriptor.bias", a.channels_descriptor), l);
 }
 
 void read_fine_register(TensorSet& tensors, ModelData& m) {

@@ -12,7 +12,9 @@ enum class ValueType : std::uint32_t { u64 = 1, f64 = 2, boolean = 3, string = 4
 double parse_f64(ByteCursor& cursor, const std::string& what) {
   const std::size_t byte = cursor.position();
   const auto value = cursor.number<double>(what);
-  if (!std::isfinite(value)) refuse(what, byte, "a finite number", std::to_string(value));
+  if (!std::isfinite(value)) {
+    refuse(what, byte, "a finite number", std::isnan(value) ? "NaN" : "infinity");
+  }
   return value;
 }
 

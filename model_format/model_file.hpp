@@ -92,32 +92,10 @@ class AlignedBytes {
   std::unique_ptr<std::byte, Release> data_;
 };
 
-/// How a file's bytes come into memory; both ways give equal tensors.
-enum class Access {
-  read,  // copied: the file may change or vanish afterwards
-  map,   // mapped read-only: the file must stay as it is for as long as it is in use
-};
-
-/// Owns a file's bytes (read into memory or mapped) for as long as a ModelFile borrows them.
-class FileBytes {
- public:
-  /// Throws Error (file_unreadable): not there, not a regular file, over 1 GiB (refused before
-  /// anything is allocated), or failing while it is read.
-  static FileBytes open(const std::string& path, Access access = Access::read);
-
-  std::span<const std::byte> span() const noexcept;
-
- private:
-  struct Unmap {
-    std::size_t size = 0;
-    void operator()(const std::byte* data) const noexcept;
-  };
-  using Mapping = std::unique_ptr<const std::byte, Unmap>;
-
-  explicit FileBytes(AlignedBytes copy) : bytes_(std::move(copy)) {}
-  explicit FileBytes(Mapping mapping) : bytes_(std::move(mapping)) {}
-
-  std::variant<AlignedBytes, Mapping> bytes_;
-};
+/// The bytes of a file. They are copied, never mapped: whoever may write to a mapped file could
+/// change it after it was checked, or end the process by making it shorter. Throws Error
+/// (file_unreadable): not there, not a regular file, over 1 GiB (refused before anything is
+/// allocated), or failing while it is read.
+AlignedBytes read_file(const std::string& path);
 
 }  // namespace vnreg::model_format

@@ -1,7 +1,8 @@
 """Writer and reader of the `.vnr` container, byte for byte as model_format/SPEC.md defines it.
 
-The C++ engine has a reader of its own; the two share nothing but the specification. The writer is
-deterministic: equal metadata and tensors give equal bytes.
+The C++ engine has a reader of its own; the two share nothing but the specification, make the checks
+in the same order and refuse a file with the same words. The writer is deterministic: equal metadata
+and tensors give equal bytes.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import stat
 import struct
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import google_crc32c
 import numpy as np
@@ -129,12 +130,13 @@ def encode_model(metadata: Mapping[str, MetadataValue], tensors: Mapping[str, Te
 
 def decode_model(content: bytes) -> tuple[dict[str, MetadataValue], dict[str, Tensor]]:
     """Metadata and tensors (copies) of a file's bytes; checks every rule. Raises ModelFileError."""
-    metadata_bytes, tensor_count, data_offset = _decode_header(content)
-    table_start = _HEADER.size + metadata_bytes
+    header = _decode_header(content)
+    table_start = _HEADER.size + header.metadata_bytes
     metadata = _decode_metadata(_Cursor(content, _HEADER.size, table_start))
-    table = _Cursor(content, table_start, data_offset)
-    tensors = _decode_tensors(table, tensor_count, content, data_offset)
-    return metadata, tensors
+    places = _decode_table(_Cursor(content, table_start, header.data_offset), header)
+    computed = google_crc32c.value(content[header.data_offset :])
+    _check_equal("data checksum (byte 56)", header.data_checksum, computed)
+    return metadata, {name: _decode_tensor(content, name, place) for name, place in places.items()}
 
 
 def _encode_name(kind: str, name: str) -> bytes:
@@ -225,8 +227,18 @@ class _Cursor:
         return layout.unpack(self.take(layout.size, field))[0]
 
 
-def _decode_header(content: bytes) -> tuple[int, int, int]:
-    """Metadata bytes, tensor count and data offset, once both checksums are verified."""
+class _Header(NamedTuple):
+    """What the other parts need of the first 64 bytes."""
+
+    metadata_bytes: int
+    tensor_count: int
+    data_offset: int
+    data_bytes: int
+    data_checksum: int
+
+
+def _decode_header(content: bytes) -> _Header:
+    """The header, once it fits the file and the head checksum is verified."""
     if content[: len(MAGIC)] != MAGIC:
         raise _refusal("magic", 0, MAGIC.hex(" "), _describe_magic(content[: len(MAGIC)]))
     if len(content) < _HEADER.size:
@@ -240,15 +252,16 @@ def _decode_header(content: bytes) -> tuple[int, int, int]:
     _check_equal("file size (byte 16)", len(content), size)
     _check_at_most("metadata bytes (byte 24)", metadata_bytes, MAX_METADATA_BYTES)
     _check_at_most("tensor count (byte 32)", count, MAX_TENSORS)
+    _check_at_most("data offset (byte 40)", offset, MAX_FILE_BYTES)
     first = _HEADER.size + metadata_bytes
     if offset % _ALIGNMENT != 0 or not first <= offset <= size:
         expected = f"a multiple of {_ALIGNMENT} from {first} to {size}"
         raise _refusal("data offset", 40, expected, offset)
+    _check_at_most("data bytes (byte 48)", data_bytes, MAX_FILE_BYTES)
     _check_equal("data bytes (byte 48)", data_bytes, size - offset)
     head = content[:_HEAD_CHECKSUM_BYTE] + content[_HEADER.size : offset]
     _check_equal("head checksum (byte 60)", head_crc, google_crc32c.value(head))
-    _check_equal("data checksum (byte 56)", data_crc, google_crc32c.value(content[offset:]))
-    return metadata_bytes, count, offset
+    return _Header(metadata_bytes, count, offset, data_bytes, data_crc)
 
 
 def _describe_magic(found: bytes) -> str:
@@ -265,7 +278,10 @@ def _decode_name(cursor: _Cursor, field: str, previous: str) -> str:
     start = cursor.position
     name = cursor.take(length, field).decode("latin-1")
     if not _NAME.fullmatch(name):
-        raise _refusal(field, start, "A-Z a-z 0-9 . _ only", ascii(name))
+        good = _NAME.match(name)
+        bad = good.end() if good else 0
+        got = f"a byte of value {ord(name[bad])}"
+        raise _refusal(field, start + bad, "A-Z a-z 0-9 . _ only", got)
     if name <= previous:
         raise _refusal(field, start, f'a name after "{previous}"', f'"{name}"')
     return name
@@ -288,7 +304,7 @@ def _decode_value(cursor: _Cursor, field: str) -> MetadataValue:
     if code == _F64:
         value = float(cursor.number("d", field))
         if not math.isfinite(value):
-            raise _refusal(field, start + 4, "a finite number", value)
+            raise _refusal(field, start + 4, "a finite number", _word_for(value))
         return value
     if code == _BOOL:
         flag = cursor.number("B", field)
@@ -305,67 +321,97 @@ def _decode_string(cursor: _Cursor, field: str) -> str:
     length = cursor.number("I", f"{field} length")
     start = cursor.position
     encoded = cursor.take(length, field)
+    bad = encoded.find(0)
     try:
         text = encoded.decode("utf-8")
     except UnicodeDecodeError as error:
-        got = f"a sequence that starts with {encoded[error.start]}"
-        raise _refusal(field, start + error.start, "UTF-8", got) from error
-    if "\0" in text:
-        raise _refusal(field, start + encoded.index(0), "UTF-8 without U+0000", "U+0000")
+        bad = error.start if bad < 0 else min(bad, error.start)
+    if bad >= 0:
+        got = f"a sequence that starts with {encoded[bad]}"
+        raise _refusal(field, start + bad, "UTF-8 without U+0000", got)
     return text
 
 
-def _decode_tensors(
-    table: _Cursor, count: int, content: bytes, data_offset: int
-) -> dict[str, Tensor]:
-    tensors: dict[str, Tensor] = {}
+class _Place(NamedTuple):
+    """Where a tensor's elements lie in the file, and what they are."""
+
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+    begin: int
+    end: int
+
+
+def _decode_table(table: _Cursor, header: _Header) -> dict[str, _Place]:
+    """The places of all tensors; the elements are not looked at."""
+    places: dict[str, _Place] = {}
     name = ""
-    position = data_offset
-    for index in range(count):
+    offset = 0
+    for index in range(header.tensor_count):
         name = _decode_name(table, f"name of tensor {index}", name)
-        tensors[name], position = _decode_tensor(table, name, content, data_offset, position)
-    _check_equal("data offset (byte 40)", data_offset, _rounded_up(table.position))
-    _check_zero(content, table.position, data_offset, "padding after the tensor table")
-    _check_equal("data bytes (byte 48)", len(content) - data_offset, position - data_offset)
-    return tensors
+        places[name] = _decode_place(table, name, header, offset)
+        offset = _rounded_up(places[name].end) - header.data_offset
+    end = _rounded_up(table.position)
+    _check_equal("data offset (byte 40)", header.data_offset, end)
+    field = "padding after the tensor table"
+    _check_zero(table.content, table.position, header.data_offset, field)
+    _check_equal("data bytes (byte 48)", header.data_bytes, offset)
+    return places
 
 
-def _decode_tensor(
-    table: _Cursor, name: str, content: bytes, data_offset: int, position: int
-) -> tuple[Tensor, int]:
-    """One tensor, whose elements must start at `position`, and where the next one must start."""
+def _decode_place(table: _Cursor, name: str, header: _Header, expected_offset: int) -> _Place:
+    """One entry of the table after its name; its elements must start at `expected_offset`."""
     field = f'tensor "{name}"'
     start = table.position
-    dtype = _DTYPES.get(table.number("I", f"{field} dtype"))
-    if dtype is None:
-        got = int.from_bytes(content[start : start + 4], "little")
-        raise _refusal(f"{field} dtype", start, "1 (f32), 2 (f64) or 3 (i32)", got)
-    shape = _decode_shape(table, field)
-    size = math.prod(shape) * dtype.itemsize
+    code = table.number("I", f"{field} dtype")
+    if code not in _DTYPES:
+        raise _refusal(f"{field} dtype", start, "1 (f32), 2 (f64) or 3 (i32)", code)
+    dtype = _DTYPES[code]
+    shape, size = _decode_shape(table, field, dtype.itemsize)
     start = table.position
     offset = table.number("Q", f"{field} offset")
-    if offset != position - data_offset:
-        raise _refusal(f"{field} offset", start, position - data_offset, offset)
-    end = position + _rounded_up(size)
-    if end > len(content):
-        expected = f"at most {len(content) - position} bytes of data"
-        raise _refusal(f"{field} padded size", start, expected, end - position)
-    _check_zero(content, position + size, end, f"padding after {field}")
-    view = np.frombuffer(content, dtype=dtype, count=math.prod(shape), offset=position)
-    _check_finite(field, view)
-    return view.reshape(shape).astype(dtype.newbyteorder("="), copy=True), end
+    if offset != expected_offset:
+        raise _refusal(f"{field} offset", start, expected_offset, offset)
+    room = header.data_bytes - offset
+    if _rounded_up(size) > room:
+        expected = f"at most {room} bytes of data"
+        raise _refusal(f"{field} padded size", start, expected, _rounded_up(size))
+    begin = header.data_offset + offset
+    return _Place(dtype, shape, begin, begin + size)
 
 
-def _decode_shape(table: _Cursor, field: str) -> tuple[int, ...]:
+def _decode_shape(table: _Cursor, field: str, size: int) -> tuple[tuple[int, ...], int]:
+    """The shape, and the bytes of all elements, given those of one."""
     start = table.position
     rank = table.number("I", f"{field} rank")
     if not 1 <= rank <= MAX_RANK:
         raise _refusal(f"{field} rank", start, f"1 to {MAX_RANK}", rank)
-    start = table.position
-    shape = struct.unpack(f"<{rank}Q", table.take(8 * rank, f"{field} shape"))
-    if min(shape) < 1:
-        raise _refusal(f"{field} shape", start, "every extent at least 1", shape)
-    return shape
+    shape: list[int] = []
+    for axis in range(rank):
+        start = table.position
+        extent = table.number("Q", f"{field} extent of axis {axis}")
+        most = MAX_FILE_BYTES // size
+        if not 1 <= extent <= most:
+            raise _refusal(f"{field} extent of axis {axis}", start, f"1 to {most}", extent)
+        size *= extent
+        shape.append(extent)
+    return tuple(shape), size
+
+
+def _decode_tensor(content: bytes, name: str, place: _Place) -> Tensor:
+    """A copy of the elements, and a look at the padding behind them."""
+    field = f'tensor "{name}"'
+    count = math.prod(place.shape)
+    view = np.frombuffer(content, dtype=place.dtype, count=count, offset=place.begin)
+    if view.dtype.kind == "f" and not np.isfinite(view).all():
+        bad = int(np.flatnonzero(~np.isfinite(view))[0])
+        byte = place.begin + bad * view.dtype.itemsize
+        raise _refusal(f"{field} element {bad}", byte, "a finite number", _word_for(view[bad]))
+    _check_zero(content, place.end, _rounded_up(place.end), f"padding after {field}")
+    return view.reshape(place.shape).astype(place.dtype.newbyteorder("="), copy=True)
+
+
+def _word_for(value: float) -> str:
+    return "NaN" if math.isnan(value) else "infinity"
 
 
 def _read_file(path: Path) -> bytes:
@@ -373,8 +419,14 @@ def _read_file(path: Path) -> bytes:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):
             raise ModelFileError(f'file "{path}"', "a regular file", "a pipe or a device")
-        _check_at_most(f'size of file "{path}"', status.st_size, MAX_FILE_BYTES)
-        return file.read(status.st_size)
+        if status.st_size > MAX_FILE_BYTES:
+            expected, got = f"at most {MAX_FILE_BYTES} bytes", f"{status.st_size} bytes"
+            raise ModelFileError(f'file "{path}"', expected, got)
+        content = file.read(status.st_size)
+    if len(content) < status.st_size:
+        got = f"{len(content)} bytes: it shrank while it was read"
+        raise ModelFileError(f'file "{path}"', f"{status.st_size} bytes", got)
+    return content
 
 
 def _open_without_waiting(path: str, flags: int) -> int:

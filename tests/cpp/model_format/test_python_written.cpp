@@ -15,7 +15,7 @@ std::vector<Scalar> values(std::span<const Scalar> elements) {
 }
 
 TEST_CASE("python: the metadata of the written file") {
-  const FileBytes bytes = FileBytes::open(path, GENERATE(Access::read, Access::map));
+  const AlignedBytes bytes = read_file(path);
   const ModelFile file = ModelFile::parse(bytes.span());
   const ModelFile::Metadata expected{
       {"arch", std::string("golden")},
@@ -32,7 +32,7 @@ TEST_CASE("python: the metadata of the written file") {
 }
 
 TEST_CASE("python: the tensors of the written file") {
-  const FileBytes bytes = FileBytes::open(path, GENERATE(Access::read, Access::map));
+  const AlignedBytes bytes = read_file(path);
   const ModelFile file = ModelFile::parse(bytes.span());
   const auto tensor = [&](const char* name) { return file.tensors().find(name)->second; };
   REQUIRE(file.tensors().size() == 6);

@@ -11,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from vnreg_train.export.architecture import check_architecture
 from vnreg_train.model_file import MetadataValue, read_model, write_model
 from vnreg_train.networks.descriptor import Block, DescriptorNetwork, Neighbourhood
 from vnreg_train.networks.descriptor_config import DescriptorConfig
@@ -153,10 +154,12 @@ def import_descriptor_model(
 ) -> tuple[DescriptorNetwork, dict[str, MetadataValue]]:
     """The network of a model file, in evaluation mode, and the file's metadata.
 
-    The input scales are folded into the first layers, so they come back as ones. Raises
-    ModelFileError for a broken file, ValueError where it is not one of architecture `vnreg`.
+    The input scales are folded into the first layers, so they come back as ones; the judge is a
+    network of its own (networks/judge.py). Raises ModelFileError for a broken file and for metadata
+    and tensors that no architecture has, and ValueError where it is not architecture `vnreg`.
     """
     metadata, tensors = read_model(path)
+    check_architecture(metadata, tensors)
     if metadata.get("arch") != "vnreg":
         raise ValueError(f"{path}: expected architecture 'vnreg', got {metadata.get('arch')!r}")
     network = DescriptorNetwork(descriptor_config(metadata)).eval()
@@ -167,16 +170,8 @@ def import_descriptor_model(
         "context.vectors": network.pre_context.weight,
         "lengths": network.temperature,
     }
-    # The judge is a network of its own (networks/judge.py).
-    own = {name for name in tensors if not name.startswith("judge.")}
-    if set(destinations) != own:
-        differing = sorted(set(destinations) ^ own)
-        raise ValueError(f"{path}: tensors missing or unknown: {', '.join(differing)}")
     for name, destination in destinations.items():
         value = torch.from_numpy(tensors[name])
-        if value.shape != destination.shape:
-            expected, got = tuple(destination.shape), tuple(value.shape)
-            raise ValueError(f"{path}: {name}: expected shape {expected}, got {got}")
         with torch.no_grad():
             destination.copy_(2 * value.log() if name == "lengths" else value)
     return network, metadata

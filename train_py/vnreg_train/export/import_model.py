@@ -13,6 +13,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
+from vnreg_train.export.architecture import check_architecture
 from vnreg_train.export.model import config_from_metadata
 from vnreg_train.model_file import MetadataValue, read_model
 from vnreg_train.networks.fine import NormedLinear
@@ -93,10 +94,11 @@ def _destinations(network: RegistrationNetwork) -> Named:
 def import_model(path: str | Path) -> tuple[RegistrationNetwork, dict[str, MetadataValue]]:
     """The network of a model file, in evaluation mode, and the file's metadata.
 
-    Raises ModelFileError for a broken file, and ValueError where its metadata and tensors are not
-    those of architecture `paper`.
+    Raises ModelFileError for a broken file and for metadata and tensors that no architecture has,
+    and ValueError where it is not architecture `paper`.
     """
     metadata, tensors = read_model(path)
+    check_architecture(metadata, tensors)
     if metadata.get("arch") != "paper":
         raise ValueError(f"{path}: expected architecture 'paper', got {metadata.get('arch')!r}")
     network = RegistrationNetwork(config_from_metadata(metadata)).eval()
@@ -104,15 +106,7 @@ def import_model(path: str | Path) -> tuple[RegistrationNetwork, dict[str, Metad
         for layer in module.modules():
             if isinstance(layer, nn.BatchNorm1d):
                 neutralise(layer)
-    destinations = dict(_destinations(network))
-    if set(destinations) != set(tensors):
-        differing = sorted(set(destinations) ^ set(tensors))
-        raise ValueError(f"{path}: tensors missing or unknown: {', '.join(differing)}")
-    for name, destination in destinations.items():
-        value = torch.from_numpy(tensors[name])
-        if value.shape != destination.shape:
-            expected, got = tuple(destination.shape), tuple(value.shape)
-            raise ValueError(f"{path}: {name}: expected shape {expected}, got {got}")
+    for name, destination in _destinations(network):
         with torch.no_grad():
-            destination.copy_(value)
+            destination.copy_(torch.from_numpy(tensors[name]))
     return network, metadata

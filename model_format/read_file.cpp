@@ -1,5 +1,4 @@
 #include <fcntl.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -65,33 +64,14 @@ AlignedBytes read_all(const std::string& path, int descriptor, std::size_t size)
   return copy;
 }
 
-const std::byte* map_all(const std::string& path, int descriptor, std::size_t size) {
-  if (size == 0) return nullptr;  // nothing to map; mmap would refuse it
-  void* address = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, descriptor, 0);
-  if (address == MAP_FAILED) refuse(path, "a file that can be mapped", reason(errno));
-  return static_cast<const std::byte*>(address);
-}
-
 }  // namespace
 
-FileBytes FileBytes::open(const std::string& path, Access access) {
+AlignedBytes read_file(const std::string& path) {
   if (path.find('\0') != std::string::npos) {
     refuse(path.substr(0, path.find('\0')), "a path without zero bytes", "one with a zero byte");
   }
   const Descriptor descriptor(path);
-  const std::size_t size = checked_size(path, descriptor.value());
-  if (access == Access::read) return FileBytes(read_all(path, descriptor.value(), size));
-  return FileBytes(Mapping(map_all(path, descriptor.value(), size), Unmap{size}));
-}
-
-void FileBytes::Unmap::operator()(const std::byte* data) const noexcept {
-  ::munmap(const_cast<std::byte*>(data), size);
-}
-
-std::span<const std::byte> FileBytes::span() const noexcept {
-  if (const auto* copy = std::get_if<AlignedBytes>(&bytes_)) return copy->span();
-  const auto& mapping = *std::get_if<Mapping>(&bytes_);
-  return {mapping.get(), mapping ? mapping.get_deleter().size : 0};
+  return read_all(path, descriptor.value(), checked_size(path, descriptor.value()));
 }
 
 }  // namespace vnreg::model_format
