@@ -67,6 +67,7 @@ void refuse_if_all_equal(const NamedCloud& cloud) {
       case Status::ok:
       case Status::low_confidence:
       case Status::ambiguous:
+      case Status::scales_differ:
       case Status::timed_out:
       case Status::cancelled:
         break;
@@ -148,6 +149,8 @@ CLI::App* add_align_command(CLI::App& app, AlignArguments& arguments) {
           "Use at most so many points of a cloud (64 to 16384); 0: as the model was trained")
       ->type_name("N")
       ->check(CLI::Range(0, 16384));
+  command->add_flag("--drop-non-finite", arguments.options.drop_non_finite,
+                    "Leave out points with NaN or infinite coordinates instead of refusing them");
   command->add_option("--seed", arguments.options.seed, "Seed of the choice of those points")
       ->check(CLI::Validator(check_seed, ""))
       ->type_name("N");

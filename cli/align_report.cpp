@@ -148,6 +148,10 @@ std::string to_text(const AlignReport& report) {
        << number_text(result.inlier_distance, 4) << ")\n";
   text << "points       " << result.points_source << " source, " << result.points_target
        << " target\n";
+  if (const std::size_t dropped = result.dropped_source + result.dropped_target; dropped > 0) {
+    text << "dropped      " << result.dropped_source << " source, " << result.dropped_target
+         << " target (not finite)\n";
+  }
   text << "model        " << report.model << ", mode " << to_string(report.mode) << '\n';
   text << "time        ";
   for (const NamedTime& time : named_times(result.ms)) {
@@ -175,6 +179,8 @@ std::string to_json(const AlignReport& report) {
   json["evidence"] = evidence_json(result.evidence);
   json["points_source"] = result.points_source;
   json["points_target"] = result.points_target;
+  json["dropped_source"] = result.dropped_source;
+  json["dropped_target"] = result.dropped_target;
   json["ms"] = std::move(ms);
   json["model"] = report.model;
   json["mode"] = to_string(report.mode);

@@ -36,7 +36,7 @@ namespace vnreg {
 namespace {
 
 static_assert(VNREG_MODE_VERIFIED == static_cast<int>(Mode::verified));
-static_assert(VNREG_STATUS_CANCELLED == static_cast<int>(Status::cancelled));
+static_assert(VNREG_STATUS_SCALES_DIFFER == static_cast<int>(Status::scales_differ));
 static_assert(VNREG_INVALID_POINTS == 1 + static_cast<int>(ErrorCode::invalid_points));
 static_assert(VNREG_MOST_ALTERNATIVES == Alternatives::capacity);
 
@@ -115,6 +115,7 @@ Options options_or_default(const vnreg_options* o) noexcept {
   options.record_stages = o->record_stages != 0;
   options.time_budget_ms = o->time_budget_ms;
   options.cancellation = o->cancellation == nullptr ? nullptr : &o->cancellation->flag;
+  options.drop_non_finite = o->drop_non_finite != 0;
   return options;
 }
 
@@ -170,6 +171,8 @@ void copy_result(const Result& r, vnreg_result& out) noexcept {
   out.evidence = c_evidence(r.evidence);
   out.points_source = r.points_source;
   out.points_target = r.points_target;
+  out.dropped_source = r.dropped_source;
+  out.dropped_target = r.dropped_target;
   out.ms = c_times(r.ms);
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <span>
 
 #include "engine/counter_hash.hpp"
 
@@ -58,42 +59,90 @@ void sort_by_index(Cloud::Candidate* first, Cloud::Candidate* last, Deadline& de
   sort_by_index(middle, last, deadline);
 }
 
-/// The points with the smallest hashes, in the order of the input, by a heap of fixed size. Stops
-/// short when the deadline passes.
-void choose(std::size_t count, std::uint64_t seed, Deadline& deadline,
-            std::vector<Cloud::Candidate>& chosen) noexcept {
-  const std::size_t kept = chosen.size();
-  for (std::size_t i = 0; i < kept; ++i) chosen[i] = {counter_hash(seed, i), i};
-  std::make_heap(chosen.begin(), chosen.end());
-  for (std::size_t i = kept; i < count; ++i) {
-    if (time_is_up(i, deadline)) return;
-    const Cloud::Candidate candidate{counter_hash(seed, i), i};
-    if (!(candidate < chosen.front())) continue;
-    std::pop_heap(chosen.begin(), chosen.end());
-    chosen.back() = candidate;
-    std::push_heap(chosen.begin(), chosen.end());
+/// Keeps the candidates with the smallest hashes of those that are offered, by a heap of fixed
+/// size. `rank` counts them from 0.
+void offer(std::size_t rank, const Cloud::Candidate& candidate,
+           std::span<Cloud::Candidate> chosen) noexcept {
+  if (rank < chosen.size()) {
+    chosen[rank] = candidate;
+    if (rank + 1 == chosen.size()) std::make_heap(chosen.begin(), chosen.end());
+    return;
   }
-  sort_by_index(chosen.data(), chosen.data() + chosen.size(), deadline);
+  if (!(candidate < chosen.front())) return;
+  std::pop_heap(chosen.begin(), chosen.end());
+  chosen.back() = candidate;
+  std::push_heap(chosen.begin(), chosen.end());
+}
+
+/// Chooses max_points of the usable points, in the order of the input. A point's hash is that of
+/// its rank among the usable ones, so what was dropped changes nothing.
+template <class Scalar>
+void choose(const PointsView& points, std::uint64_t seed, Deadline& deadline,
+            Cloud& cloud) noexcept {
+  std::size_t rank = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (time_is_up(i, deadline)) return;
+    if (cloud.dropped > 0 && !usable(read_point<Scalar>(points, i))) continue;
+    offer(rank, {counter_hash(seed, rank), i}, cloud.candidates);
+    ++rank;
+  }
+  Cloud::Candidate* first = cloud.candidates.data();
+  sort_by_index(first, first + cloud.candidates.size(), deadline);
+}
+
+/// How many points are usable; stops at the first that is not, unless those are dropped. The
+/// answer means nothing if the deadline passes meanwhile.
+template <class Scalar>
+std::size_t count_usable(const PointsView& points, bool drop, Deadline& deadline) noexcept {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (time_is_up(i, deadline)) return count;
+    if (usable(read_point<Scalar>(points, i))) {
+      ++count;
+    } else if (!drop) {
+      return count;
+    }
+  }
+  return count;
+}
+
+void store(const Point& p, Index place, Cloud& cloud) noexcept {
+  double* xyz = cloud.xyz.data() + 3 * place;
+  xyz[0] = p.x;
+  xyz[1] = p.y;
+  xyz[2] = p.z;
+}
+
+/// All usable points, which fit.
+template <class Scalar>
+void take_all(const PointsView& points, Cloud& cloud) noexcept {
+  Index place = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Point p = read_point<Scalar>(points, i);
+    if (cloud.dropped == 0 || usable(p)) store(p, place++, cloud);
+  }
 }
 
 template <class Scalar>
-bool take_points(const PointsView& points, std::uint64_t seed, Deadline& deadline,
-                 Cloud& cloud) noexcept {
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (time_is_up(i, deadline)) return false;
-    if (!usable(read_point<Scalar>(points, i))) return false;
+Status take_points(const PointsView& points, const Gathering& how, Deadline& deadline,
+                   Cloud& cloud) noexcept {
+  const std::size_t count = count_usable<Scalar>(points, how.drop_non_finite, deadline);
+  if (deadline.expired()) return Status::not_finite;
+  if (count < points.size() && !how.drop_non_finite) return Status::not_finite;
+  cloud.dropped = points.size() - count;
+  if (count <= static_cast<std::size_t>(cloud.max_points)) {
+    cloud.count = static_cast<Index>(count);
+    take_all<Scalar>(points, cloud);
+  } else {
+    cloud.count = cloud.max_points;
+    choose<Scalar>(points, how.seed, deadline, cloud);
+    if (deadline.passed()) return Status::not_finite;
+    for (Index i = 0; i < cloud.count; ++i) {
+      store(read_point<Scalar>(points, cloud.candidates[static_cast<std::size_t>(i)].index), i,
+            cloud);
+    }
   }
-  const bool all = points.size() <= static_cast<std::size_t>(cloud.max_points);
-  cloud.count = all ? static_cast<Index>(points.size()) : cloud.max_points;
-  if (!all) choose(points.size(), seed, deadline, cloud.candidates);
-  if (deadline.passed()) return false;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(cloud.count); ++i) {
-    const Point p = read_point<Scalar>(points, all ? i : cloud.candidates[i].index);
-    cloud.xyz[3 * i] = p.x;
-    cloud.xyz[3 * i + 1] = p.y;
-    cloud.xyz[3 * i + 2] = p.z;
-  }
-  return true;
+  return cloud.count < how.min_points ? Status::too_few_points : Status::ok;
 }
 
 /// Whether a covariance has a second direction.
@@ -142,17 +191,19 @@ Cloud::Cloud(Index max)
   }
 }
 
-Status gather(const PointsView& points, Index min_points, std::uint64_t seed, Deadline& deadline,
+Status gather(const PointsView& points, const Gathering& how, Deadline& deadline,
               Cloud& cloud) noexcept {
   cloud.count = 0;
-  if (points.data() == nullptr || points.size() < static_cast<std::size_t>(min_points)) {
+  cloud.dropped = 0;
+  if (points.data() == nullptr || points.size() < static_cast<std::size_t>(how.min_points)) {
     cloud.count = static_cast<Index>(points.data() == nullptr ? 0 : points.size());
     return Status::too_few_points;
   }
-  const bool finite = points.scalar() == PointsView::Scalar::float32
-                          ? take_points<float>(points, seed, deadline, cloud)
-                          : take_points<double>(points, seed, deadline, cloud);
-  if (!finite || deadline.passed()) return Status::not_finite;
+  const Status taken = points.scalar() == PointsView::Scalar::float32
+                           ? take_points<float>(points, how, deadline, cloud)
+                           : take_points<double>(points, how, deadline, cloud);
+  if (taken != Status::ok) return taken;
+  if (deadline.passed()) return Status::not_finite;
   return measure(cloud) ? Status::ok : Status::degenerate;
 }
 

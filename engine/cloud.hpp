@@ -31,6 +31,7 @@ struct Cloud {
   std::vector<Candidate> candidates;  // of the subsampling
 
   Index count = 0;          // points used
+  std::size_t dropped = 0;  // points left out because a coordinate was not usable
   std::vector<double> xyz;  // the user's coordinates of the points used
   double centroid[3] = {0, 0, 0};
   double rms_radius = 0;
@@ -41,9 +42,16 @@ struct Cloud {
   kernels::Floats spacing_squared;               // to the nearest other point
 };
 
+/// How points are taken from a user's cloud.
+struct Gathering {
+  Index min_points = 0;
+  std::uint64_t seed = 0;
+  bool drop_non_finite = false;
+};
+
 /// Checks the points, takes at most max_points of them, and finds centroid and r.m.s. radius. The
 /// answer means nothing if the deadline passes meanwhile.
-Status gather(const PointsView& points, Index min_points, std::uint64_t seed, Deadline& deadline,
+Status gather(const PointsView& points, const Gathering& how, Deadline& deadline,
               Cloud& cloud) noexcept;
 
 /// Network coordinates: float32((p - centroid) / scale). False if they leave the range in which

@@ -35,6 +35,8 @@ std::string_view to_string(Status status) noexcept {
       return "timed_out";
     case Status::cancelled:
       return "cancelled";
+    case Status::scales_differ:
+      return "scales_differ";
   }
   return "unknown";
 }

@@ -84,13 +84,18 @@ double choose_radius(const Input inputs[2], Workspace& w) noexcept {
   return chosen;
 }
 
+Gathering gathering(const ModelData& model, const Options& options) noexcept {
+  return {model.arch.min_points(), options.seed, options.drop_non_finite};
+}
+
 /// The points used, centroid and radius.
 Status take(const ModelData& model, const Options& options, const Input& input, Workspace& w,
             Cloud& cloud) noexcept {
   if (input.prepared == nullptr) {
-    return gather(input.points, model.arch.min_points(), options.seed, w.deadline, cloud);
+    return gather(input.points, gathering(model, options), w.deadline, cloud);
   }
   cloud.count = input.prepared->cloud.count;
+  cloud.dropped = input.prepared->cloud.dropped;
   if (input.prepared->status == Status::ok) cloud = input.prepared->cloud;
   return input.prepared->status;
 }
@@ -103,7 +108,10 @@ Status unfinished(const Deadline& deadline) noexcept {
 Status prepare(const ModelData& model, const Options& options, const Input inputs[2], Workspace& w,
                double& scale) noexcept {
   Status status[2];
-  for (Cloud& cloud : w.cloud) cloud.count = 0;
+  for (Cloud& cloud : w.cloud) {
+    cloud.count = 0;
+    cloud.dropped = 0;
+  }
   parallel_for(w.threads, 2, [&](Index side, int) {
     status[side] = take(model, options, inputs[side], w, w.cloud[side]);
   });
@@ -175,6 +183,13 @@ Status judge(const VerifiedPoses& poses, const ModelData& model, double scale, c
   return result.confidence < 0.5 ? Status::low_confidence : Status::ok;
 }
 
+/// Whether the clouds' sizes say that their units differ, or that one is but a small part.
+bool scales_differ(const Cloud cloud[2]) noexcept {
+  constexpr double most = 3;
+  const double a = cloud[0].rms_radius, b = cloud[1].rms_radius;
+  return std::max(a, b) > most * std::min(a, b);
+}
+
 /// Everything but the total time. Leaves `result` without a pose unless it has a finite one.
 Status run(const ModelData& model, const Options& options, const Input inputs[2], Workspace& w,
            Result& result) noexcept {
@@ -183,6 +198,8 @@ Status run(const ModelData& model, const Options& options, const Input inputs[2]
   const Status prepared = prepare(model, options, inputs, w, scale);
   result.points_source = static_cast<std::size_t>(w.cloud[0].count);
   result.points_target = static_cast<std::size_t>(w.cloud[1].count);
+  result.dropped_source = w.cloud[0].dropped;
+  result.dropped_target = w.cloud[1].dropped;
   result.ms.prepare = watch.lap();
   if (prepared != Status::ok) return prepared;
 
@@ -237,6 +254,7 @@ Status run(const ModelData& model, const Options& options, const Input inputs[2]
     result.confidence = confidence(model.calibration, residual);
     if (result.confidence < 0.5) status = Status::low_confidence;
   }
+  if (scales_differ(w.cloud)) status = Status::scales_differ;
   result.ms.measure = watch.lap();
   return status;
 }
@@ -245,8 +263,7 @@ Status run(const ModelData& model, const Options& options, const Input inputs[2]
 Status run_alone(const ModelData& model, const Options& options, const PointsView& points,
                  Workspace& w) noexcept {
   constexpr Index side = 0;
-  const Status gathered =
-      gather(points, model.arch.min_points(), options.seed, w.deadline, w.cloud[side]);
+  const Status gathered = gather(points, gathering(model, options), w.deadline, w.cloud[side]);
   if (w.deadline.expired()) return unfinished(w.deadline);
   if (gathered != Status::ok) return gathered;
   const double radius = w.cloud[side].rms_radius;

@@ -142,11 +142,12 @@ class BorrowedPairs {
 };
 
 nb::list align_pairs(nb::handle pairs, const std::optional<Model>& model, std::string_view mode,
-                     int threads, int max_points, std::uint64_t seed, double time_budget_ms) {
+                     int threads, int max_points, std::uint64_t seed, double time_budget_ms,
+                     bool drop_non_finite) {
   const BorrowedPairs borrowed(pairs);
   const std::span<const CloudPair> all = borrowed.view();
   BatchRegistrar batch(chosen_model(model), {mode_from(mode), threads, max_points, seed, false,
-                                             time_budget_ms, nullptr});
+                                             time_budget_ms, nullptr, drop_non_finite});
   std::vector<Result> results(all.size());
   const std::size_t chunk = pairs_per_look * static_cast<std::size_t>(batch.threads());
   for (std::size_t first = 0; first < all.size(); first += chunk) {
@@ -197,19 +198,21 @@ void bind_registrar_class(nb::module_& module) {
       "seed: of the subsampling. record_stages: keep every activation for stages().\n"
       "time_budget_ms: after it align returns with status 'timed_out'; 0 means no limit.\n"
       "cancellation: a Cancellation that ends running calls.\n"
+      "drop_non_finite: leave out points with a NaN, infinite or huge coordinate; else the status\n"
+      "is 'not_finite'.\n"
       "Threads that share a Registrar wait for each other. Raises Error (invalid_option).")
       .def(
           "__init__",
           [](SharedRegistrar* self, const std::optional<Model>& model, std::string_view mode,
              int threads, int max_points, std::uint64_t seed, bool record_stages,
-             double time_budget_ms, const Cancellation* cancellation) {
-            const Options options{mode_from(mode), threads,        max_points,  seed,
-                                  record_stages,   time_budget_ms, cancellation};
+             double time_budget_ms, const Cancellation* cancellation, bool drop_non_finite) {
+            const Options options{mode_from(mode), threads,        max_points,   seed,
+                                  record_stages,   time_budget_ms, cancellation, drop_non_finite};
             new (self) SharedRegistrar(chosen_model(model), options);
           },
           "model"_a = nb::none(), nb::kw_only(), "mode"_a = "verified", "threads"_a = 1,
           "max_points"_a = 0, "seed"_a = 0, "record_stages"_a = false, "time_budget_ms"_a = 0.0,
-          "cancellation"_a = nb::none(), nb::keep_alive<1, 9>())
+          "cancellation"_a = nb::none(), "drop_non_finite"_a = false, nb::keep_alive<1, 9>())
       .def("align", &SharedRegistrar::align, "source"_a.none(), "target"_a.none(),
            "The pose that maps `source` onto `target`, arrays (N, 3) and (M, 3), PreparedClouds,\n"
            "or point clouds and meshes of Open3D and trimesh (of meshes, 8,192 points of the\n"
@@ -229,21 +232,21 @@ void bind_functions(nb::module_& module) {
       "align",
       [](nb::handle source, nb::handle target, const std::optional<Model>& model,
          std::string_view mode, int threads, int max_points, std::uint64_t seed,
-         double time_budget_ms) {
+         double time_budget_ms, bool drop_non_finite) {
         const Options options{mode_from(mode), threads,        max_points, seed,
-                              false,           time_budget_ms, nullptr};
+                              false,           time_budget_ms, nullptr,    drop_non_finite};
         return SharedRegistrar(chosen_model(model), options).align(source, target);
       },
       "source"_a.none(), "target"_a.none(), nb::kw_only(), "model"_a = nb::none(),
       "mode"_a = "verified", "threads"_a = 1, "max_points"_a = 0, "seed"_a = 0,
-      "time_budget_ms"_a = 0.0,
+      "time_budget_ms"_a = 0.0, "drop_non_finite"_a = false,
       "The pose that maps `source` (N, 3) onto `target` (M, 3), from any starting pose.\n\n"
       "model: None means the built-in one. The options are those of Registrar, which is faster\n"
       "for many pairs. Returns a Result. Raises ValueError, TypeError, Error as Registrar does.");
   module.def(
       "align_many", &align_pairs, "pairs"_a, nb::kw_only(), "model"_a = nb::none(),
       "mode"_a = "verified", "threads"_a = 0, "max_points"_a = 0, "seed"_a = 0,
-      "time_budget_ms"_a = 0.0,
+      "time_budget_ms"_a = 0.0, "drop_non_finite"_a = false,
       "The Results of many pairs (source, target), in their order, with one pair per thread at a\n"
       "time. Sources and targets are what Registrar.align takes; time_budget_ms is that of each\n"
       "pair. An interrupt (Ctrl-C) ends the call. Raises as Registrar does.");

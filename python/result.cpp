@@ -84,7 +84,7 @@ std::string describe(const Result& result) {
 }
 
 Status status_from(std::string_view name) {
-  for (int i = 0; i <= static_cast<int>(Status::cancelled); ++i) {
+  for (int i = 0; i <= static_cast<int>(Status::scales_differ); ++i) {
     if (to_string(static_cast<Status>(i)) == name) return static_cast<Status>(i);
   }
   throw nb::value_error("status: not one that this version knows");
@@ -107,6 +107,8 @@ nb::dict state_of(const Result& r) {
   state["evidence"] = r.evidence.values();
   state["points_source"] = r.points_source;
   state["points_target"] = r.points_target;
+  state["dropped_source"] = r.dropped_source;
+  state["dropped_target"] = r.dropped_target;
   state["ms"] = milliseconds(r.ms);
   return state;
 }
@@ -148,6 +150,8 @@ Result result_from(const nb::dict& state) {
       evidence_from(nb::cast<std::array<double, Evidence::names.size()>>(state["evidence"]));
   take(state, "points_source", r.points_source);
   take(state, "points_target", r.points_target);
+  take(state, "dropped_source", r.dropped_source);
+  take(state, "dropped_target", r.dropped_target);
   r.ms = times_from(nb::cast<nb::dict>(state["ms"]));
   return r;
 }
@@ -174,7 +178,8 @@ void bind_result_class(nb::module_& module) {
       .def_prop_ro(
           "status", [](const Result& r) { return to_string(r.status); },
           "'ok', 'low_confidence' (more likely wrong than right), 'ambiguous' (an alternative\n"
-          "fits nearly as well; goes before 'low_confidence'), or without a pose:\n"
+          "fits nearly as well; goes before 'low_confidence'), 'scales_differ' (one cloud is more\n"
+          "than 3 times as large as the other; goes before 'ambiguous'), or without a pose:\n"
           "'too_few_points', 'not_finite', 'degenerate', 'cancelled'. 'timed_out': has_pose tells\n"
           "whether a pose was found by then, which nothing has judged.")
       .def_ro("has_pose", &Result::has_pose, "Whether there is a pose; if not, the poses are NaN.")
@@ -214,6 +219,8 @@ void bind_result_class(nb::module_& module) {
           "of the information on the rotation).")
       .def_ro("points_source", &Result::points_source, "Points used, after subsampling.")
       .def_ro("points_target", &Result::points_target, "Points used, after subsampling.")
+      .def_ro("dropped_source", &Result::dropped_source, "Points left out by drop_non_finite.")
+      .def_ro("dropped_target", &Result::dropped_target, "Points left out by drop_non_finite.")
       .def_prop_ro(
           "ms", [](const Result& r) { return milliseconds(r.ms); },
           "Milliseconds: prepare, encode, coarse, fine, hypotheses, verify, measure and total.")

@@ -15,6 +15,7 @@ _Status = Literal[
     "degenerate",
     "timed_out",
     "cancelled",
+    "scales_differ",
 ]
 # Any: the clouds and meshes of Open3D and trimesh, which need not be installed.
 _Cloud: TypeAlias = ArrayLike | PreparedCloud | Any
@@ -79,6 +80,10 @@ class Result:
     @property
     def points_target(self) -> int: ...
     @property
+    def dropped_source(self) -> int: ...
+    @property
+    def dropped_target(self) -> int: ...
+    @property
     def ms(self) -> dict[str, float]: ...
 
 class PreparedCloud:
@@ -105,6 +110,7 @@ class Registrar:
         record_stages: bool = False,
         time_budget_ms: float = 0.0,
         cancellation: Cancellation | None = None,
+        drop_non_finite: bool = False,
     ) -> None: ...
     def align(self, source: _Cloud, target: _Cloud) -> Result: ...
     def prepare(self, cloud: ArrayLike | Any) -> PreparedCloud: ...
@@ -120,6 +126,7 @@ def align(
     max_points: int = 0,
     seed: int = 0,
     time_budget_ms: float = 0.0,
+    drop_non_finite: bool = False,
 ) -> Result: ...
 def align_many(
     pairs: Iterable[tuple[_Cloud, _Cloud]],
@@ -130,4 +137,5 @@ def align_many(
     max_points: int = 0,
     seed: int = 0,
     time_budget_ms: float = 0.0,
+    drop_non_finite: bool = False,
 ) -> list[Result]: ...

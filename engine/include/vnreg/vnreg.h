@@ -85,7 +85,8 @@ enum {
   VNREG_STATUS_DEGENERATE = 4,     /**< the points do not determine a rotation */
   VNREG_STATUS_AMBIGUOUS = 5,      /**< a pose was found, but another fits nearly as well */
   VNREG_STATUS_TIMED_OUT = 6,      /**< the budget was spent; has_pose tells if there is a pose */
-  VNREG_STATUS_CANCELLED = 7       /**< the cancellation was raised */
+  VNREG_STATUS_CANCELLED = 7,      /**< the cancellation was raised */
+  VNREG_STATUS_SCALES_DIFFER = 8   /**< a pose was found, but one cloud is over 3 times as large */
 };
 
 /** The type of coordinates: one of those below. */
@@ -134,11 +135,12 @@ typedef struct vnreg_options {
   uint64_t seed;         /**< of the subsampling of larger clouds */
   double time_budget_ms; /**< of one pair; 0: no limit; at most 1e9 */
   const vnreg_cancellation* cancellation; /**< ends running calls when it is raised; may be NULL */
+  int32_t drop_non_finite; /**< not 0: points that are no numbers are left out, else refused */
 } vnreg_options;
 
 /** vnreg_options options = VNREG_DEFAULT_OPTIONS; where options are asked for, NULL means these. */
 #define VNREG_DEFAULT_OPTIONS \
-  { VNREG_MODE_VERIFIED, 0, 0, 0, 0, 0.0, NULL }
+  { VNREG_MODE_VERIFIED, 0, 0, 0, 0, 0.0, NULL, 0 }
 
 /** The most alternatives that a result has. */
 #define VNREG_MOST_ALTERNATIVES 4
@@ -190,6 +192,8 @@ typedef struct vnreg_result {
   vnreg_evidence evidence; /**< what the confidence is computed from */
   size_t points_source;    /**< points used, after subsampling */
   size_t points_target;    /**< points used, after subsampling */
+  size_t dropped_source;   /**< points left out by drop_non_finite */
+  size_t dropped_target;   /**< points left out by drop_non_finite */
   vnreg_times ms;          /**< how long it took */
 } vnreg_result;
 

@@ -69,6 +69,8 @@ enum class Status {
   timed_out,  ///< the time budget was spent; has_pose tells whether a pose was found by then, which
               ///< nothing has judged: confidence, covariance and overlap are unknown
   cancelled,  ///< Options::cancellation was raised: no pose
+  scales_differ,  ///< a pose was found, but the r.m.s. radius of one cloud is more than 3 times the
+                  ///< other's: different units, or a small part? It goes before ambiguous
 };
 
 /// The mode's name as it is written above.
@@ -96,6 +98,9 @@ struct Options {
   double time_budget_ms = 0;
   /// Ends running calls when it is raised: see Cancellation. Not owned.
   const Cancellation* cancellation = nullptr;
+  /// Leaves out points with a coordinate that is NaN, infinite or beyond 1e300, as if they had not
+  /// been given, where Status::not_finite would refuse the cloud: see Result::dropped_source.
+  bool drop_non_finite = false;
 };
 
 /// How long the parts of a call took, in milliseconds.
@@ -200,10 +205,12 @@ struct Result {
   /// least 80 %) and differ from T_target_source and from each other by 15 degrees or 0.1 r.m.s.
   /// radii. Else none.
   Alternatives alternatives;
-  Evidence evidence;              ///< mode verified; else NaN
-  std::size_t points_source = 0;  ///< points used, after subsampling
-  std::size_t points_target = 0;  ///< points used, after subsampling
-  StageTimes ms;                  ///< how long the call took
+  Evidence evidence;               ///< mode verified; else NaN
+  std::size_t points_source = 0;   ///< points used, after subsampling
+  std::size_t points_target = 0;   ///< points used, after subsampling
+  std::size_t dropped_source = 0;  ///< points left out by Options::drop_non_finite
+  std::size_t dropped_target = 0;  ///< points left out by Options::drop_non_finite
+  StageTimes ms;                   ///< how long the call took
 };
 
 /// One recorded activation, row-major, as torch holds it. See docs/design.md for names and shapes.

@@ -23,7 +23,7 @@ bool is_rigid(const Pose& pose) {
 void check_consistent(const Result& r) {
   if (r.has_pose) {
     REQUIRE((r.status == Status::ok || r.status == Status::low_confidence ||
-             r.status == Status::ambiguous));
+             r.status == Status::ambiguous || r.status == Status::scales_differ));
     REQUIRE(is_rigid(r.T_target_source));
     REQUIRE(is_rigid(r.T_target_source_coarse));
     REQUIRE(std::isfinite(r.rmse));
@@ -90,6 +90,34 @@ TEST_CASE_METHOD(Fixture, "a coordinate that is not a usable number, anywhere") 
     Points cloud = large;
     cloud[i][1] = nan;
     REQUIRE(registrar.align(cloud, good).status == Status::not_finite);
+  }
+}
+
+TEST_CASE_METHOD(Fixture, "what is not a usable number is left out on request") {
+  Registrar dropping(random_model().build(), {.mode = Mode::paper, .drop_non_finite = true});
+  const Points source = shape(90, random);
+  const Pose expected = dropping.align(source, good).T_target_source;
+  for (const double bad : {nan, inf, -inf, 2e300}) {
+    Points spoilt = source;
+    spoilt.insert(spoilt.begin() + 40, {0.1, bad, 0.2});
+    spoilt.push_back({bad, 0, 0});
+    const Result& r = dropping.align(spoilt, good);
+    REQUIRE(r.T_target_source == expected);
+    REQUIRE((r.dropped_source == 2 && r.dropped_target == 0 && r.points_source == 90));
+    REQUIRE(dropping.align(good, spoilt).dropped_target == 2);
+  }
+  const Points none(90, {nan, nan, nan});
+  REQUIRE(dropping.align(none, good).status == Status::too_few_points);
+  REQUIRE(dropping.align(good, good).dropped_source == 0);
+}
+
+TEST_CASE_METHOD(Fixture, "clouds of very different sizes are said to be") {
+  for (const double ratio : {1.0, 2.9, 3.1, 1e3, 1e-3}) {
+    const Points other = moved(good, Eigen::Isometry3d::Identity(), ratio);
+    const bool far = std::max(ratio, 1 / ratio) > 3;
+    const Result& r = registrar.align(good, other);
+    check_consistent(r);
+    if (r.has_pose) REQUIRE((r.status == Status::scales_differ) == far);
   }
 }
 

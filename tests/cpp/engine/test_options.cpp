@@ -99,6 +99,7 @@ TEST_CASE("the words of the API") {
   REQUIRE(to_string(Status::ok) == "ok");
   REQUIRE(to_string(Status::low_confidence) == "low_confidence");
   REQUIRE(to_string(Status::too_few_points) == "too_few_points");
+  REQUIRE(to_string(Status::scales_differ) == "scales_differ");
   REQUIRE(to_string(Status::not_finite) == "not_finite");
   REQUIRE(to_string(Status::degenerate) == "degenerate");
   REQUIRE(to_string(Status::ambiguous) == "ambiguous");

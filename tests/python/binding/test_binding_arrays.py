@@ -183,7 +183,8 @@ def test_any_numbers_give_a_status_and_a_finite_pose_or_none(
 ) -> None:
     result = vnreg.align(points, points[::-1], model=model)
     assert np.isfinite(result.T_target_source).all() == result.has_pose
-    assert result.has_pose == (result.status in ("ok", "low_confidence", "ambiguous"))
+    with_pose = ("ok", "low_confidence", "ambiguous", "scales_differ")
+    assert result.has_pose == (result.status in with_pose)
     if len(points) < model.min_points:
         assert result.status == "too_few_points"
     elif not (np.abs(points.astype(float)) <= 1e300).all():

@@ -53,6 +53,7 @@ class Options(c.Structure):
         ("seed", c.c_uint64),
         ("time_budget_ms", c.c_double),
         ("cancellation", c.c_void_p),
+        ("drop_non_finite", c.c_int32),
     ]
 
 
@@ -77,6 +78,8 @@ class Result(c.Structure):
         ("evidence", c.c_double * 8),
         ("points_source", c.c_size_t),
         ("points_target", c.c_size_t),
+        ("dropped_source", c.c_size_t),
+        ("dropped_target", c.c_size_t),
         ("ms", c.c_double * 8),
     ]
 
@@ -318,6 +321,27 @@ def test_a_raised_cancellation_ends_a_call(library: c.CDLL, points: tuple[Array,
     library.vnreg_cancellation_reset(cancellation)
     assert registrar.align(*clouds).has_pose
     library.vnreg_cancellation_free(cancellation)
+
+
+def test_points_that_are_no_numbers_are_refused_or_dropped(
+    library: c.CDLL, points: tuple[Array, Array]
+) -> None:
+    source, target = points[0].copy(), points[1]
+    source[7, 1] = np.nan
+    refused = Registrar(library).align(cloud(source), cloud(target))
+    assert library.vnreg_status_name(refused.status) == b"not_finite"
+    dropping = Registrar(library, drop_non_finite=1)
+    result = dropping.align(cloud(source), cloud(target))
+    assert result.has_pose and (result.dropped_source, result.dropped_target) == (1, 0)
+    assert dropping.align(cloud(target), cloud(source)).dropped_target == 1
+
+
+def test_clouds_of_different_scales_are_said_to_be(
+    library: c.CDLL, points: tuple[Array, Array]
+) -> None:
+    result = Registrar(library).align(cloud(points[0]), cloud(1000 * points[1]))
+    assert result.has_pose
+    assert library.vnreg_status_name(result.status) == b"scales_differ"
 
 
 def test_a_budget_is_kept(library: c.CDLL, points: tuple[Array, Array]) -> None:
