@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 import trimesh
+from cli_program import OK, Program, moved
 from numpy.typing import NDArray
 
 Points = NDArray[np.float64]
@@ -133,3 +135,14 @@ WRITERS: dict[str, tuple[str, Callable[[Path, Points], None]]] = {
     "npy Fortran": ("a.npy", npy("<f8", "F")),
     "no extension": ("a", npy("<f8")),
 }
+
+
+def read_back(vnreg: Program, model: Path, path: Path) -> Points:
+    """What the program reads: the cloud aligned with itself is moved by (nearly) nothing."""
+    with tempfile.TemporaryDirectory() as folder:
+        output = Path(folder) / "out.ply"
+        arguments = ("--json", "--mode=coarse", "--model", model, "-o", output)
+        run = vnreg("align", path, path, *arguments)
+        assert run.code == OK, run.stderr
+        back = np.linalg.inv(np.array(run.json()["T_target_source"]))
+        return moved(back, read_ply(output))
