@@ -1,0 +1,57 @@
+"""Mode paper against torch on random small networks: any widths, switches, weights and clouds."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from hypothesis import given, note, settings
+from hypothesis import strategies as st
+from parity_errors import error_alone
+from parity_pairs import make_test_pair
+from parity_run import Run
+from parity_twin import Twin
+from random_network import random_network
+
+from vnreg_train.export.model import export_model
+from vnreg_train.networks.config import NetworkConfig
+
+# Single layers of few channels may cancel, so an order above what trained widths keep to.
+LIMIT = 1e-4
+EXAMPLES = int(os.environ.get("VNREG_FUZZ_NETWORKS", "12"))
+
+CONFIGS = st.builds(
+    NetworkConfig,
+    global_channels=st.integers(4, 24),
+    local_channels=st.integers(1, 6).map(lambda n: 4 * n),
+    descriptor_channels=st.integers(1, 20),
+    pair_channels=st.integers(2, 12),
+    significance_channels=st.tuples(st.integers(1, 12), st.integers(1, 8)),
+    neighbours=st.integers(2, 30),
+    shared_direction=st.booleans(),
+    fine_iterations=st.integers(1, 4),
+    keep_divisor=st.integers(1, 8),
+    input_rms_radius=st.sampled_from([0.0, 0.33, 1.0]),
+)
+
+
+@settings(max_examples=EXAMPLES, deadline=None)
+@given(
+    config=CONFIGS,
+    seed=st.integers(0, 2**31),
+    sizes=st.tuples(st.integers(64, 160), st.integers(64, 160)),
+    noisy=st.booleans(),
+)
+def test_every_stage_of_a_random_network(
+    config: NetworkConfig, seed: int, sizes: tuple[int, int], noisy: bool
+) -> None:
+    network = random_network(config, seed)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "random.vnr"
+        export_model(network, path, "random")
+        pair = Run(Twin("random", network, path), make_test_pair(seed, *sizes, noisy))
+    for stage in pair.alone:
+        error = error_alone(stage, pair.engine, pair.alone)
+        note(f"{stage}: {error}")
+        assert error <= LIMIT, stage
