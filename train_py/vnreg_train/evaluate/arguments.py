@@ -10,8 +10,11 @@ Subcommands = Any  # argparse names the type privately
 
 
 def add_evaluation_commands(commands: Subcommands) -> None:
-    """evaluate, calibrate, find-symmetries, tune-peers, report."""
+    """evaluate, disjoint, calibrate, find-symmetries, tune-peers, report."""
     _add_evaluate(commands.add_parser("evaluate", help="measure methods on rows of pairs"))
+    _add_disjoint(
+        commands.add_parser("disjoint", help="how sure the engine is of pairs of different objects")
+    )
     _add_calibrate(commands.add_parser("calibrate", help="fit the confidence on validation pairs"))
     _add_find_symmetries(
         commands.add_parser("find-symmetries", help="list the symmetries of the furniture models")
@@ -41,6 +44,14 @@ def _add_evaluate(command: argparse.ArgumentParser) -> None:
     command.add_argument("--failures", action="store_true", help="list the pairs that were lost")
     command.add_argument("--run", help="folder that keeps the answers; a second call goes on")
     command.set_defaults(run_command=_evaluate)
+
+
+def _add_disjoint(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--data", default="data/furniture", help="folder of the shapes")
+    command.add_argument("--split", default="validation", choices=("train", "validation", "test"))
+    command.add_argument("--pairs", type=int, default=1000)
+    command.add_argument("--seed", type=int, default=0)
+    command.set_defaults(run_command=_disjoint)
 
 
 def _add_calibrate(command: argparse.ArgumentParser) -> None:
@@ -86,6 +97,15 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     from vnreg_train.evaluate.commands import evaluate_main
 
     evaluate_main(arguments)
+
+
+def _disjoint(arguments: argparse.Namespace) -> None:
+    _use_one_thread()
+    from pathlib import Path
+
+    from vnreg_train.evaluate.disjoint import print_report
+
+    print_report(Path(arguments.data), arguments.split, arguments.pairs, arguments.seed)
 
 
 def _calibrate(arguments: argparse.Namespace) -> None:
