@@ -61,6 +61,9 @@ def _add_calibrate(command: argparse.ArgumentParser) -> None:
     command.add_argument("--split", default="validation", choices=("train", "validation"))
     command.add_argument("--shapes", type=int, help="only so many, spread evenly over the split")
     command.add_argument("--seeds", nargs="+", type=int, default=[11, 12, 13])
+    command.add_argument(
+        "--different", type=int, default=0, help="so many pairs of different objects, too"
+    )
     command.add_argument("--out", help="write the model with its calibration here (may be itself)")
     command.set_defaults(run_command=_calibrate)
 

@@ -14,8 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
+import vnreg
 from vnreg_train.data.mesh import Float64
+from vnreg_train.data.shapes import load_shapes
 from vnreg_train.evaluate.confidence import Bools, auroc, fit_logistic, reliability, sigmoid
+from vnreg_train.evaluate.disjoint import disjoint_answers
 from vnreg_train.evaluate.estimates import Estimate
 from vnreg_train.evaluate.measures import NEES_DIMENSIONS
 from vnreg_train.evaluate.methods import EngineMethod, Method, Mode
@@ -27,6 +30,8 @@ from vnreg_train.model_file import read_model, write_model
 
 RIDGE = {"paper": 1e-3, "verified": 1e-3}
 PREFIX = {"paper": "calibration.", "verified": "calibration.verified."}
+# Other pairs than those of `vnreg-train disjoint`.
+DISJOINT_SEED = 1_000_000
 # Verified: every row of P1 and of views, and P0 as much as the users of its protocol deserve.
 ROWS = {"paper": ("p0",), "verified": ("p1", "views", "P0/*/180")}
 
@@ -130,6 +135,22 @@ def collect_sample(
     return Sample(names, np.array(evidence), np.array(right, bool), np.array(shape), np.array(nees))
 
 
+def with_different_objects(sample: Sample, path: Path, pairing: Pairing, count: int) -> Sample:
+    """The sample, and the evidence of `count` pairs of two different shapes: all of them wrong."""
+    registrar = vnreg.Registrar(vnreg.Model.load(path), threads=1)
+    shapes = load_shapes(pairing.data, pairing.split, queries=0)
+    answers = disjoint_answers(registrar, shapes, count, seed=DISJOINT_SEED)
+    posed = [answer for answer in answers if answer.result.has_pose]
+    evidence = [[answer.result.evidence[name] for name in sample.names] for answer in posed]
+    return Sample(
+        sample.names,
+        np.concatenate([sample.evidence, np.array(evidence)]),
+        np.concatenate([sample.right, np.zeros(len(posed), bool)]),
+        np.concatenate([sample.shape, [float(answer.source_shape) for answer in posed]]),
+        np.concatenate([sample.nees, np.full(len(posed), np.nan)]),
+    )
+
+
 def _draws(mode: str, seeds: Sequence[int]) -> Iterator[tuple[Row, int]]:
     for row in select_rows(ROWS[mode]):
         for seed in seeds:
@@ -148,9 +169,15 @@ def calibrate_model(
     pairing: Pairing,
     seeds: Sequence[int],
     groups: Mapping[str, SymmetryGroup],
+    different: int = 0,
 ) -> Calibration:
-    """Fits one mode of a model file on the pairing's split."""
+    """Fits one mode of a model file on the pairing's split.
+
+    different: so many pairs of different objects are wrong poses, too; mode verified only.
+    """
     sample = collect_sample(EngineMethod(mode, path), mode, pairing, seeds, groups)
+    if different > 0:
+        sample = with_different_objects(sample, path, pairing, different)
     factor = float(read_model(path)[0].get(PREFIX["verified"] + "covariance", 1.0))
     return fit_calibration(sample, mode, factor)
 

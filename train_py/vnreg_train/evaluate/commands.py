@@ -65,7 +65,7 @@ def calibrate_main(arguments: argparse.Namespace) -> None:
     pairing = Pairing(arguments.split, arguments.shapes, data=Path(arguments.data))
     model = Path(arguments.model)
     calibration = calibrate_model(
-        model, arguments.mode, pairing, arguments.seeds, read_symmetries()
+        model, arguments.mode, pairing, arguments.seeds, read_symmetries(), arguments.different
     )
     print(json.dumps(asdict(calibration), indent=1))
     if arguments.out:
