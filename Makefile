@@ -9,22 +9,28 @@ PRESET ?= release
 CLI := build/$(PRESET)/vnreg
 DEBIAN := cmake ninja-build ccache g++ libeigen3-dev catch2 libcli11-dev nlohmann-json3-dev \
           libbenchmark-dev python3-dev python3-venv doxygen
+FUZZ_DEBIAN := clang-14 libclang-rt-14-dev libomp-14-dev llvm-14
 # What the wheel of Open3D, a peer of `make evaluate`, links with.
 PEERS_DEBIAN := libusb-1.0-0 libgl1 libegl1 libidn2-0
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python test-isa soak \
-        check sanitize \
+        check sanitize analyse valgrind stress fuzz fuzzers fuzz-builds fuzz-coverage \
         bench bench-compare evaluate train train-paper data model docs wheel clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
 
-debian-packages:
-	@missing=$$(dpkg-query -W -f='$${Package} $${db:Status-Abbrev}\n' $(DEBIAN) 2>&1 \
+# Installs what is missing of a list of Debian packages.
+define install_debian
+	@missing=$$(dpkg-query -W -f='$${Package} $${db:Status-Abbrev}\n' $(1) 2>&1 \
 	  | awk '/no packages found matching/ {print $$NF} $$2 == "un" {print $$1}'); \
 	if [ -n "$$missing" ]; then \
 	  $(SUDO) apt-get update -q && $(SUDO) apt-get install -y -q --no-install-recommends $$missing; fi
+endef
+
+debian-packages:
+	$(call install_debian,$(DEBIAN))
 
 $(VENV)/.installed: requirements/dev.txt requirements/train.txt | debian-packages
 	python3 -m venv $(VENV)
@@ -73,6 +79,44 @@ sanitize: debian-packages ## the C++ tests under address and undefined-behaviour
 	cmake --build --preset asan-ubsan
 	ctest --preset asan-ubsan
 
+analyse: debian-packages ## static analysis of the C++ code by cppcheck
+	$(call install_debian,cppcheck)
+	cppcheck --quiet --std=c++20 --language=c++ --enable=warning,performance,portability --inline-suppr \
+	  --suppress=missingIncludeSystem --suppress=unknownMacro --suppress=passedByValue \
+	  -I. -Iengine/include -Icli --error-exitcode=1 model_format cli kernels engine python fuzz
+
+# One pair from files to pose, with the least instructions, which valgrind knows.
+valgrind: debian-packages ## one pair end to end under valgrind, leaks included
+	$(call install_debian,valgrind)
+	cmake --preset debug -DVNREG_ISA=x86-64-v2 -B build/valgrind > /dev/null
+	cmake --build build/valgrind --target vnreg_cli
+	valgrind --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=definite,indirect,possible \
+	  build/valgrind/vnreg align examples/data/mug_1.xyz examples/data/mug_2.xyz --threads 1 \
+	  --max-points 128 > /dev/null || [ $$? -eq 4 ]  # 4: not sure
+
+stress: build ## 8 threads x 10,000 aligns of one model, twice: undisturbed, and in a storm of cancellations
+	VNREG_STRESS_ALIGNS=10000 build/$(PRESET)/test_engine "8 threads*,a storm of cancellations*"
+
+SECONDS ?= 60
+fuzzers: debian-packages
+	$(call install_debian,$(FUZZ_DEBIAN))
+	cmake --preset fuzz > /dev/null
+	cmake --build --preset fuzz
+
+# What the fuzz target `builds` compares.
+fuzz-builds: debian-packages
+	cmake --preset fuzz-builds > /dev/null
+	cmake --build --preset fuzz-builds
+
+fuzz: fuzzers $(if $(TARGETS),$(filter fuzz-builds,$(TARGETS:%=fuzz-%)),fuzz-builds) ## all fuzz targets for SECONDS=60 each, from their corpora; TARGETS="ply model": only these
+	fuzz/run.sh build/fuzz $(SECONDS) $(TARGETS)
+
+fuzz-coverage: debian-packages ## the lines of the readers that the corpora of the fuzz targets cover
+	$(call install_debian,$(FUZZ_DEBIAN))
+	cmake --preset fuzz-coverage > /dev/null
+	cmake --build --preset fuzz-coverage
+	fuzz/coverage.sh build/fuzz-coverage
+
 data: setup ## sample the furniture models into data/furniture
 	$(PY) -m vnreg_train.cli build-data
 
@@ -84,10 +128,7 @@ train-paper: data ## train models/small.vnr's network, the paper's, from the sta
 	$(PY) -m vnreg_train.cli train small --stage fine
 
 $(VENV)/.peers: requirements/evaluate.txt $(VENV)/.installed
-	@missing=$$(dpkg-query -W -f='$${Package} $${db:Status-Abbrev}\n' $(PEERS_DEBIAN) 2>&1 \
-	  | awk '/no packages found matching/ {print $$NF} $$2 == "un" {print $$1}'); \
-	if [ -n "$$missing" ]; then \
-	  $(SUDO) apt-get update -q && $(SUDO) apt-get install -y -q --no-install-recommends $$missing; fi
+	$(call install_debian,$(PEERS_DEBIAN))
 	$(PY) -m pip install -q -r requirements/evaluate.txt
 	touch $@
 

@@ -31,7 +31,8 @@ void check_finite(std::span<const std::byte> file, const Tensor& tensor, Bits ex
   if (all) return;
   std::size_t first = 0;
   while (is_finite(bits_of(first), exponent)) ++first;
-  const bool infinite = static_cast<Bits>(bits_of(first) << 1) == static_cast<Bits>(exponent << 1);
+  constexpr Bits sign = Bits{1} << (8 * sizeof(Bits) - 1);
+  const bool infinite = (bits_of(first) & ~sign) == exponent;
   refuse("tensor \"" + tensor.name + "\" element " + std::to_string(first),
          begin_of(file, tensor) + first * sizeof(Bits), "a finite number",
          infinite ? "infinity" : "NaN");

@@ -1,0 +1,50 @@
+// Any bytes to one of the readers of point clouds, chosen by VNREG_FUZZ_READER when this is
+// compiled.
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+#include "cloud_file/readers.hpp"
+#include "require.hpp"
+
+namespace vnreg::fuzz {
+namespace {
+
+using cloud_file::CloudFileError;
+using cloud_file::Points;
+
+/// The densest points: three numbers of a byte each, packed by LZF, which never does better than 88
+/// to 1.
+constexpr std::size_t most_points_per_byte = 88 / 3 + 1;
+
+void check(const Points& points, std::size_t bytes) {
+  require(points.size() <= most_points_per_byte * bytes, "memory is bounded by the file's size");
+  double sum = 0;
+  for (const auto& point : points) sum += point[0] + point[1] + point[2];
+  // Looks at every coordinate, so that memory that nothing wrote is noticed.
+  require(std::isnan(sum) || sum < 1 || sum >= 1, "a number");
+}
+
+void check(const CloudFileError& error) {
+  const std::string text = error.what();
+  require(!text.empty() && text.size() < 1000, "the message is short");
+  for (const char c : text) {
+    require(static_cast<unsigned char>(c) >= 0x20, "the message is one printable line");
+  }
+}
+
+void read(std::string_view bytes) {
+  try {
+    check(VNREG_FUZZ_READER, bytes.size());
+  } catch (const CloudFileError& error) {
+    check(error);
+  }
+}
+
+}  // namespace
+}  // namespace vnreg::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  vnreg::fuzz::read({reinterpret_cast<const char*>(data), size});
+  return 0;
+}
