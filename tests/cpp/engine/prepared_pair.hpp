@@ -27,8 +27,8 @@ class PreparedPair {
             shipped_model().data(), {.mode = Mode::verified, .threads = threads},
             static_cast<detail::Index>(std::max({source.size(), target.size(), std::size_t{64}}))) {
     detail::Cloud* cloud = workspace_.cloud;
-    detail::gather(source, 1, 0, workspace_.deadline, cloud[0]);
-    detail::gather(target, 1, 0, workspace_.deadline, cloud[1]);
+    detail::gather(source, {.min_points = 1}, workspace_.deadline, cloud[0]);
+    detail::gather(target, {.min_points = 1}, workspace_.deadline, cloud[1]);
     const double radius = std::max(cloud[0].rms_radius, cloud[1].rms_radius);
     if (radius > 0) scale_ = radius / shipped_model().data().arch.rms_radius;
     workspace_.verified.radius = radius / scale_;
