@@ -82,8 +82,7 @@ sanitize: debian-packages ## the C++ tests under address and undefined-behaviour
 analyse: debian-packages ## static analysis of the C++ code by cppcheck
 	$(call install_debian,cppcheck)
 	cppcheck --quiet --std=c++20 --language=c++ --enable=warning,performance,portability --inline-suppr \
-	  --suppress=missingIncludeSystem --suppress=unknownMacro --suppress=passedByValue \
-	  -I. -Iengine/include -Icli --error-exitcode=1 model_format cli kernels engine python fuzz
+	  --suppressions-list=.cppcheck -I. -Iengine/include -Icli --error-exitcode=1 model_format cli kernels engine fuzz
 
 # One pair from files to pose, with the least instructions, which valgrind knows.
 valgrind: debian-packages ## one pair end to end under valgrind, leaks included

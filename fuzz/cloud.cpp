@@ -1,6 +1,5 @@
 // Any bytes to one of the readers of point clouds, chosen by VNREG_FUZZ_READER when this is
 // compiled.
-#include <cmath>
 #include <cstdint>
 #include <string>
 
@@ -19,10 +18,9 @@ constexpr std::size_t most_points_per_byte = 88 / 3 + 1;
 
 void check(const Points& points, std::size_t bytes) {
   require(points.size() <= most_points_per_byte * bytes, "memory is bounded by the file's size");
-  double sum = 0;
-  for (const auto& point : points) sum += point[0] + point[1] + point[2];
-  // Looks at every coordinate, so that memory that nothing wrote is noticed.
-  require(std::isnan(sum) || sum < 1 || sum >= 1, "a number");
+  // Looks at every coordinate, so that memory that is not the cloud's is noticed.
+  static volatile double sink;
+  for (const auto& point : points) sink = point[0] + point[1] + point[2];
 }
 
 void check(const CloudFileError& error) {
