@@ -91,6 +91,7 @@ def train_judge(arguments: argparse.Namespace) -> None:
         arguments.seeds,
         read_symmetries(),
         Path(arguments.data),
+        different=arguments.different,
     )
     settings = judge_train.JudgeTraining(steps=arguments.steps)
     judge_train.write_judge(model, out, judge_train.train_judge(samples, settings))
@@ -150,6 +151,9 @@ def parser() -> argparse.ArgumentParser:
     judge.add_argument("--out", required=True, help="the model with its judge (may be itself)")
     judge.add_argument("--data", default="data/furniture", help="folder of the shapes")
     judge.add_argument("--seeds", nargs="+", type=int, default=[100], help="of the pairs")
+    judge.add_argument(
+        "--different", type=int, default=1500, help="pairs of different objects, all wrong"
+    )
     judge.add_argument("--steps", type=int, default=10000)
     judge.set_defaults(run_command=train_judge)
 

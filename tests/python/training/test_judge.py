@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import torch
@@ -11,7 +12,12 @@ import torch
 import vnreg
 from vnreg_train.model_file import read_model
 from vnreg_train.networks.judge import FIRST_POINTS, MOST_POINTS, POINT_INPUTS, JudgeNetwork
-from vnreg_train.training.judge_samples import KEPT_POINTS, MOST_POSES, JudgeSamples
+from vnreg_train.training.judge_samples import (
+    KEPT_POINTS,
+    MOST_POSES,
+    JudgeSamples,
+    collect_samples,
+)
 from vnreg_train.training.judge_train import (
     KEY,
     JudgeTraining,
@@ -164,3 +170,17 @@ def test_engine_refuses_a_judge_of_another_shape(tmp_path: Path) -> None:
     write_model(tmp_path / "wrong.vnr", metadata | {KEY: 13}, tensors)
     with pytest.raises(vnreg.Error, match=r"judge\.point\.0"):
         vnreg.Model.load(tmp_path / "wrong.vnr")
+
+
+def test_poses_between_different_shapes_are_wrong(tmp_path: Path) -> None:
+    rng = np.random.default_rng(7)
+    with h5py.File(tmp_path / "train.h5", "w") as file:
+        file["data"] = np.stack([cloud(4096, s) * rng.uniform(0.5, 1, 3) for s in (1, 2, 3)])
+        file["label"] = np.zeros((3, 1), np.int64)
+        file["names"] = ["a", "b", "c"]
+    found = collect_samples(
+        MODEL, "train", ["P1/noise_0.01"], [0], {}, tmp_path, shapes=[0, 2], different=3
+    )
+    assert len(found) == 5
+    assert found.there[:, 0].all() and np.isfinite(found.points).all()
+    assert found.right[:2].any() and not found.right[2:].any()

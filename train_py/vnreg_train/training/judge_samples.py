@@ -13,6 +13,7 @@ from tqdm import tqdm
 import vnreg
 from vnreg_train.data.mesh import Float64
 from vnreg_train.data.protocol import Pair
+from vnreg_train.evaluate.disjoint import disjoint_answers
 from vnreg_train.evaluate.pairs import row_pairs, split_shapes
 from vnreg_train.evaluate.rows import ROWS
 from vnreg_train.evaluate.scores import LIMITS
@@ -20,6 +21,7 @@ from vnreg_train.evaluate.symmetry import TRIVIAL, SymmetryGroup
 from vnreg_train.networks.judge import POINT_INPUTS
 
 MOST_POSES = 12  # that the engine hands to its judge
+DIFFERENT_SEED = 2_000_000  # of the pairs of different shapes
 KEPT_POINTS = 128  # of each cloud, of the judge's 256: more would fill the memory for nothing
 
 
@@ -44,25 +46,41 @@ def collect_samples(
     groups: Mapping[str, SymmetryGroup],
     data: Path,
     shapes: Sequence[int] | None = None,
+    different: int = 0,
 ) -> JudgeSamples:
-    """One pair per shape, row and seed. Shapes without an entry in `groups` count as asymmetric."""
+    """One pair per shape, row and seed. Shapes without an entry in `groups` count as asymmetric.
+
+    different: so many pairs of two different shapes, too, of which no pose is right.
+    """
     registrar = vnreg.Registrar(
         vnreg.Model.load(model), mode="verified", threads=1, record_stages=True
     )
     found = []
     for pair in tqdm(_pairs(split, rows, seeds, data, shapes), "poses", unit="pair"):
         registrar.align(pair.source, pair.target)
-        stages = registrar.stages()
-        if "judge.inputs" in stages:
-            group = groups.get(pair.name, TRIVIAL)
-            inputs, fit, poses = (
-                np.asarray(stages[f"judge.{name}"], np.float64)
-                for name in ("inputs", "fit", "poses")
-            )
-            kept = _kept(int(stages["judge.source_points"].item()), len(inputs) // len(fit))
-            points = inputs.reshape(len(fit), -1, POINT_INPUTS)[:, kept]
-            found.append((points, fit, _right(pair, poses, group)))
+        recorded = _recorded(registrar)
+        if recorded:
+            points, fit, poses = recorded
+            found.append((points, fit, _right(pair, poses, groups.get(pair.name, TRIVIAL))))
+    answers = disjoint_answers(registrar, split_shapes(split, data), different, DIFFERENT_SEED)
+    for _ in tqdm(answers, "poses of different shapes", different, unit="pair"):
+        recorded = _recorded(registrar)
+        if recorded:
+            points, fit, _ = recorded
+            found.append((points, fit, np.zeros(len(fit), bool)))
     return _padded(found)
+
+
+def _recorded(registrar: vnreg.Registrar) -> tuple[Float64, Float64, Float64] | None:
+    """Of the K poses of the last call: inputs (K, 256, 33), fit (K,), rows of (R | t) (K, 12)."""
+    stages = registrar.stages()
+    if "judge.inputs" not in stages:
+        return None
+    inputs, fit, poses = (
+        np.asarray(stages[f"judge.{name}"], np.float64) for name in ("inputs", "fit", "poses")
+    )
+    kept = _kept(int(stages["judge.source_points"].item()), len(inputs) // len(fit))
+    return inputs.reshape(len(fit), -1, POINT_INPUTS)[:, kept], fit, poses
 
 
 def _pairs(
