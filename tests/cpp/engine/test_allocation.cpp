@@ -1,60 +1,21 @@
-// After its construction a registrar allocates nothing. All ways to the heap are counted: malloc
-// and its kin are replaced here, below operator new and Eigen.
-#include <atomic>
+// After its construction a registrar allocates nothing. All ways to the heap are counted: see
+// watched_heap.cpp.
 #include <catch2/catch.hpp>
-#include <cerrno>
-#include <cstdlib>
 
 #include "clouds.hpp"
 #include "random_descriptor_model.hpp"
-
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* old, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-}
-
-namespace {
-
-std::atomic<long> allocations{0};
-
-}  // namespace
-
-extern "C" {
-void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t count, std::size_t size) {
-  ++allocations;
-  return __libc_calloc(count, size);
-}
-void* realloc(void* old, std::size_t size) {
-  ++allocations;
-  return __libc_realloc(old, size);
-}
-void* memalign(std::size_t alignment, std::size_t size) {
-  ++allocations;
-  return __libc_memalign(alignment, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) { return memalign(alignment, size); }
-int posix_memalign(void** out, std::size_t alignment, std::size_t size) {
-  *out = memalign(alignment, size);
-  return *out == nullptr ? ENOMEM : 0;
-}
-}
+#include "watched_heap.hpp"
 
 namespace vnreg::test {
 namespace {
 
 TEST_CASE("the counter counts") {
-  const long before = allocations;
+  const long before = heap::allocations();
   const auto number = std::make_unique<int>(1);
   const Eigen::VectorXf vector(1000);
   REQUIRE(*number == 1);
   REQUIRE(vector.size() == 1000);
-  const long after = allocations;
+  const long after = heap::allocations();
   REQUIRE(after >= before + 2);
 }
 
@@ -72,13 +33,13 @@ TEST_CASE("align allocates nothing, with any input and any number of threads") {
     for (const Mode mode : {Mode::coarse, Mode::paper}) {
       for (const int threads : {1, 2, 3}) {
         Registrar registrar(model, {.mode = mode, .threads = threads});
-        const long before = allocations;
+        const long before = heap::allocations();
         Status statuses[] = {
             registrar.align(source, target).status, registrar.align(many, target).status,
             registrar.align(few, many).status,      registrar.align(equal, source).status,
             registrar.align(none, source).status,   registrar.align(source, target).status,
         };
-        const long after = allocations;
+        const long after = heap::allocations();
         CAPTURE(widths.global, to_string(mode), threads);
         REQUIRE(after == before);
         REQUIRE(statuses[0] == Status::ok);
@@ -97,11 +58,11 @@ TEST_CASE("describing clouds allocates nothing") {
   const Model model = random_descriptor_model().build();
   for (const int threads : {1, 2, 3}) {
     Registrar registrar(model, {.mode = Mode::coarse, .threads = threads});
-    const long before = allocations;
+    const long before = heap::allocations();
     const Status statuses[] = {registrar.align(source, many).status,
                                registrar.align(few, source).status,
                                registrar.align(many, few).status};
-    const long after = allocations;
+    const long after = heap::allocations();
     CAPTURE(threads);
     REQUIRE(after == before);
     for (const Status status : statuses) REQUIRE(status == Status::ok);
@@ -116,7 +77,7 @@ TEST_CASE("mode verified allocates nothing, with the shipped model") {
   const Points none;
   for (const int threads : {1, 2, 3}) {
     Registrar registrar(Model::builtin(), {.threads = threads});
-    const long before = allocations;
+    const long before = heap::allocations();
     const Result with_pose[] = {
         registrar.align(source, target), registrar.align(source, many),
         registrar.align(few, source),    registrar.align(many, few),
@@ -124,7 +85,7 @@ TEST_CASE("mode verified allocates nothing, with the shipped model") {
     };
     const Status without[] = {registrar.align(equal, source).status,
                               registrar.align(source, none).status};
-    const long after = allocations;
+    const long after = heap::allocations();
     CAPTURE(threads);
     REQUIRE(after == before);
     for (const Result& result : with_pose) REQUIRE(result.has_pose);
@@ -146,7 +107,7 @@ TEST_CASE("prepared clouds, batches and budgets allocate nothing while they alig
   const CloudPair pairs[] = {{source, target}, {many, few}, {few, source}};
   Result results[3];
   batch.align_many(pairs, results);  // the threads are made
-  const long before = allocations;
+  const long before = heap::allocations();
   for (const PreparedCloud& cloud : prepared) {
     registrar.align(source, cloud);
     registrar.align(cloud, prepared[0]);
@@ -155,7 +116,7 @@ TEST_CASE("prepared clouds, batches and budgets allocate nothing while they alig
     batch.align_many(to_prepared, results);
   }
   batch.align_many(pairs, results);
-  const long after = allocations;
+  const long after = heap::allocations();
   REQUIRE(after == before);
   for (const Result& result : results) REQUIRE(result.has_pose);
 }
