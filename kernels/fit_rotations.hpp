@@ -11,7 +11,8 @@ struct MatrixBatch {
   alignas(64) double entry[9][capacity];
 };
 
-/// The rotations R that maximise trace(R^T H) for the first `count` matrices H = sum y x^T, finite.
+/// The rotations R that maximise trace(R^T H), to within 1e-6 of H's singular values' sum, for the
+/// first `count` matrices H = sum y x^T, finite.
 /// determined[i] is false, and the rotation any, where H fixes none: its two least singular values
 /// cancel, or there is but one, to within 3e-4 of the largest.
 void fit_rotations(const MatrixBatch& h, Index count, MatrixBatch& rotation,
