@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/rigid.hpp"
 #include "engine/verify.hpp"
@@ -145,7 +146,11 @@ Covariance user_covariance(const Uncertainty& uncertainty, double inflation, dou
   Matrix6 factor = std::sqrt(inflation) * uncertainty.factor;
   factor.bottomRows<3>() = scale * factor.bottomRows<3>() + lever * factor.topRows<3>();
   const Matrix6 covariance = factor * factor.transpose();
-  if (!covariance.allFinite()) return unknown_covariance;
+  // Of clouds beyond 1e150 squares overflow, of clouds below 1e-150 they vanish: a variance of 0
+  // would claim certainty.
+  const bool known = covariance.allFinite() &&
+                     covariance.diagonal().minCoeff() >= std::numeric_limits<double>::min();
+  if (!known) return unknown_covariance;
   Covariance result;
   // Symmetric to the last bit: a product sums the terms of (a, b) and (b, a) in the same order, but
   // may fuse them differently.

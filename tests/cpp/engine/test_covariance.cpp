@@ -164,6 +164,10 @@ TEST_CASE("no covariance without a pose, in other modes, or beyond float64") {
   const Result& r = registrar.align(far, far);
   REQUIRE(r.has_pose);
   REQUIRE(unknown(r));
+  const Points tiny = moved(cloud, Eigen::Isometry3d::Identity(), 1e-200);
+  const Result& small = registrar.align(tiny, tiny);
+  REQUIRE(small.has_pose);
+  REQUIRE(unknown(small));
 }
 
 }  // namespace

@@ -132,7 +132,7 @@ KINDS: list[Cloud] = [
 ]
 
 kinds = st.sampled_from(KINDS)
-scales = st.sampled_from([1.0, 1.0, 1e-30, 1e30, 1e-150, 1e150, 1e3, 1e-3])
+scales = st.sampled_from([1.0, 1.0, 1e-30, 1e30, 1e-150, 1e150, 1e-200, 1e3, 1e-3])
 offsets = st.sampled_from([0.0, 0.0, 1.0, 1e7, -1e30])
 counts = st.one_of(st.integers(0, 30), st.integers(24, 200))
 
