@@ -70,8 +70,8 @@ test-data: setup ## the test split of the furniture models, surfaces only
 	$(PY) -m vnreg_train.cli build-data --splits test --no-occupancy
 
 check: setup ## formatting, lints, types
-	$(PY) -m ruff check train_py python tests/python bench examples docs
-	$(PY) -m ruff format --check train_py python tests/python bench examples docs
+	$(PY) -m ruff check train_py python tests/python tests/soak bench examples docs
+	$(PY) -m ruff format --check train_py python tests/python tests/soak bench examples docs
 	$(PY) -m mypy train_py/vnreg_train
 
 sanitize: debian-packages ## the C++ tests under address and undefined-behaviour sanitizers
