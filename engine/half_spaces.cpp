@@ -21,7 +21,9 @@ using Eigen::internal::pstoreu;
 using kernels::packet_size;
 using Packet = kernels::Packet;
 
-static_assert(half_space_directions % (2 * packet_size) == 0);
+// Packets of directions whose sums stay in registers.
+constexpr Index together = 3;
+static_assert(half_space_directions % (together * packet_size) == 0);
 constexpr Index points_per_excess = 80;
 
 /// The projections of a point on as many directions, from the k-th on, as a packet has lanes.
@@ -65,19 +67,20 @@ HalfSpace most_beyond(const kernels::Coordinates& points, Index count,
                       const Extents& extents) noexcept {
   alignas(64) float beyond[half_space_directions];
   const Packet one = pset1<Packet>(1.0f);
-  for (Index k = 0; k < half_space_directions; k += 2 * packet_size) {
-    const Lanes lanes[2] = {Lanes(k), Lanes(k + packet_size)};
-    const Packet extent[2] = {ploadu<Packet>(extents.data() + k),
-                              ploadu<Packet>(extents.data() + k + packet_size)};
-    Packet sum[2] = {pset1<Packet>(0.0f), pset1<Packet>(0.0f)};
+  const Packet zero = pset1<Packet>(0.0f);
+  for (Index k = 0; k < half_space_directions; k += together * packet_size) {
+    const Lanes lanes[together] = {Lanes(k), Lanes(k + packet_size), Lanes(k + 2 * packet_size)};
+    Packet extent[together], sum[together] = {zero, zero, zero};
+    for (Index g = 0; g < together; ++g) {
+      extent[g] = ploadu<Packet>(extents.data() + k + g * packet_size);
+    }
     for (Index i = 0; i < count; ++i) {
-      for (int half = 0; half < 2; ++half) {
-        const Packet outside = pcmp_lt(extent[half], lanes[half].along(points, i));
-        sum[half] = padd(sum[half], pand(outside, one));
+      for (Index g = 0; g < together; ++g) {
+        const Packet outside = pcmp_lt(extent[g], lanes[g].along(points, i));
+        sum[g] = padd(sum[g], pand(outside, one));
       }
     }
-    pstore(beyond + k, sum[0]);
-    pstore(beyond + k + packet_size, sum[1]);
+    for (Index g = 0; g < together; ++g) pstore(beyond + k + g * packet_size, sum[g]);
   }
   const auto best = std::max_element(beyond, beyond + half_space_directions) - beyond;
   return {sphere_directions.x[best], sphere_directions.y[best], sphere_directions.z[best],

@@ -18,24 +18,25 @@ constexpr float least_weight = 2e-3f;      // what is added before the logarithm
 constexpr float most_depth = 0.3f;         // in units of the surfaces
 constexpr float least_log_match = -15.0f;  // of the probability of a match
 
-std::uint16_t nearest_of(const CloudDescriptors& d, float x, float y, float z) noexcept {
-  float least = std::numeric_limits<float>::infinity();
-  Index nearest = 0;
-  for (Index i = 0; i < d.count; ++i) {
-    const float dx = d.x[i] - x, dy = d.y[i] - y, dz = d.z[i] - z;
-    const float squared = dx * dx + dy * dy + dz * dz;
-    nearest = squared < least ? i : nearest;
-    least = std::min(squared, least);
-  }
-  return static_cast<std::uint16_t>(nearest);
-}
-
 /// Sets nearest_encoded of all points of the surface. False when the deadline has passed before.
 bool find_encoded(const Surface& s, float radius, const CloudDescriptors& d, Deadline& deadline,
-                  JudgedCloud& c) noexcept {
-  for (std::size_t i = 0; i < static_cast<std::size_t>(s.count); ++i) {
-    if (i % 256 == 0 && deadline.passed()) return false;
-    c.nearest_encoded[i] = nearest_of(d, radius * s.x[i], radius * s.y[i], radius * s.z[i]);
+                  kernels::NeighbourScratch& scratch, JudgedCloud& c) noexcept {
+  constexpr Index group = kernels::SpatialIndex::leaf_size;
+  c.described.build({d.x.data(), d.y.data(), d.z.data()}, d.count);
+  // In spatial order: points that are near each other are searched for together.
+  for (Index first = 0; first < s.count; first += group) {
+    if (first % 512 == 0 && deadline.passed()) return false;
+    const Index count = std::min(group, s.count - first);
+    const std::uint32_t* places = s.index.original() + first;
+    float x[group], y[group], z[group];
+    std::uint16_t nearest[group];
+    for (Index i = 0; i < count; ++i) {
+      x[i] = radius * s.x[places[i]];
+      y[i] = radius * s.y[places[i]];
+      z[i] = radius * s.z[places[i]];
+    }
+    kernels::nearest_places(c.described, {x, y, z}, count, scratch, nearest);
+    for (Index i = 0; i < count; ++i) c.nearest_encoded[places[i]] = nearest[i];
   }
   return true;
 }
@@ -266,7 +267,8 @@ void choose_judged_points(Workspace& w) noexcept {
     const Surface& s = v.surface[side];
     const CloudDescriptors& d = w.descriptors.features[side].out;
     JudgedCloud& c = v.judge.cloud[side];
-    if (!find_encoded(s, static_cast<float>(v.radius), d, w.deadline, c)) return;
+    kernels::NeighbourScratch& scratch = w.scratch[static_cast<std::size_t>(thread)].neighbours;
+    if (!find_encoded(s, static_cast<float>(v.radius), d, w.deadline, scratch, c)) return;
     choose_points(s, d, c);
     set_log_sums(side == 0 ? v.match.row_sum : v.match.column_sum, d.count, v.match.largest, c);
   });

@@ -29,7 +29,7 @@ JudgeScratch make_scratch(const JudgeModel* model, Index leaves) {
 
 }  // namespace
 
-JudgedCloud::JudgedCloud(Index max_points, Index most_encoded) {
+JudgedCloud::JudgedCloud(Index max_points, Index most_encoded) : described(most_encoded) {
   for (kernels::Floats* array :
        {&points.x, &points.y, &points.z, &points.normal_x, &points.normal_y, &points.normal_z}) {
     allocate(*array, most_judged_points);

@@ -15,7 +15,6 @@ using kernels::Coordinates;
 using kernels::SpatialIndex;
 
 constexpr Index leaves_per_task = 8;
-constexpr Index blocks_per_task = 32;
 // Spacing below which duplicates, not the surface, would set the tolerances.
 constexpr float smallest_spacing = 0.01f;
 // Variance across the main direction, relative to that along it, of what float32 leaves of a line.
@@ -24,8 +23,10 @@ constexpr double line_threshold = 1e-8;
 constexpr double smallest_radius = 1e-30;
 // R.m.s. of a normal distribution, per median of its absolute values.
 constexpr float normal_from_median = 1.4826f;
-// The grid is exact out to where the widest comparison ends.
-constexpr float reach_in_spacings = 6.0f;
+// The grid covers what lies where the widest comparison ends, and is exact a little farther, in the
+// corners and hollows that it covers, too.
+constexpr float margin_in_spacings = 6.0f;
+constexpr float reach_in_spacings = 9.0f;
 
 /// Of the numbers 0 .. 2^bits - 1, that whose bits are those of v in reverse order.
 std::uint32_t reversed(std::uint32_t v, int bits) noexcept {
@@ -42,7 +43,8 @@ void write_place(Surface& s, Index i) noexcept {
   record[2] = s.z[static_cast<std::size_t>(i)];
 }
 
-/// Takes evenly from the spatial order, in bit-reversed order: every prefix is spread evenly.
+/// Takes evenly from the spatial order, in bit-reversed order: every prefix is spread evenly. The
+/// index keeps the spatial order.
 void take_points(const Cloud& cloud, float per_radius, Surface& s) noexcept {
   const Coordinates ordered = cloud.index.ordered();
   s.count = std::min(cloud.count, static_cast<Index>(s.x.size()));
@@ -52,13 +54,17 @@ void take_points(const Cloud& cloud, float per_radius, Surface& s) noexcept {
     const auto place = static_cast<Index>(reversed(v, bits));
     if (place >= s.count) continue;
     const Index from = place * cloud.count / s.count;
-    s.origin[static_cast<std::size_t>(taken)] = cloud.index.original()[from];
-    s.x[static_cast<std::size_t>(taken)] = ordered.x[from] * per_radius;
-    s.y[static_cast<std::size_t>(taken)] = ordered.y[from] * per_radius;
-    s.z[static_cast<std::size_t>(taken)] = ordered.z[from] * per_radius;
+    const auto at = static_cast<std::size_t>(taken), in_order = static_cast<std::size_t>(place);
+    s.origin[at] = cloud.index.original()[from];
+    s.flat_x[in_order] = s.x[at] = ordered.x[from] * per_radius;
+    s.flat_y[in_order] = s.y[at] = ordered.y[from] * per_radius;
+    s.flat_z[in_order] = s.z[at] = ordered.z[from] * per_radius;
+    s.order[in_order] = static_cast<std::uint32_t>(taken);
     write_place(s, taken);
     ++taken;
   }
+  s.index.build_ordered({s.flat_x.data(), s.flat_y.data(), s.flat_z.data()}, s.order.data(),
+                        s.count);
 }
 
 Eigen::Vector3d point_at(const Surface& s, std::size_t i) noexcept {
@@ -205,18 +211,6 @@ bool is_line(const Surface& s) noexcept {
   return !(variances(1) > line_threshold * variances(2));
 }
 
-/// Calls task(side, first, last, scratch) for every chunk of `chunk` of the total(side) parts.
-template <class Total, class Task>
-void for_each_chunk(Workspace& w, Sides sides, Index chunk, const Total& total,
-                    const Task& task) noexcept {
-  const auto chunks = [&](Index side) { return (total(side) + chunk - 1) / chunk; };
-  parallel_for_parts(w.threads, sides, chunks, [&](Index side, Index i, int thread) {
-    const Index first = i * chunk;
-    task(side, first, std::min(first + chunk, total(side)),
-         w.scratch[static_cast<std::size_t>(thread)].neighbours);
-  });
-}
-
 }  // namespace
 
 Surface::Surface(Index max_points) : index(std::min(max_points, most_surface_points)) {
@@ -227,6 +221,7 @@ Surface::Surface(Index max_points) : index(std::min(max_points, most_surface_poi
   }
   records.resize(points * static_cast<std::size_t>(kernels::oriented_point_size));
   origin.resize(points);
+  order.resize(points);
   neighbours.resize(points * static_cast<std::size_t>(surface_neighbours));
   neighbour_places.resize(points * static_cast<std::size_t>(3 * neighbour_lanes));
   grid.allocate();
@@ -238,13 +233,16 @@ void fit_surfaces(Workspace& w) noexcept {
   const auto whole = [](Index) { return 1; };
   parallel_for_parts(w.threads, w.sides, whole, [&](Index side, Index, int) {
     take_points(w.cloud[side], per_radius, surface[side]);
-    surface[side].index.build(surface[side].coordinates(), surface[side].count);
   });
-  for_each_chunk(
-      w, w.sides, leaves_per_task, [&](Index side) { return surface[side].index.leaves(); },
-      [&](Index side, Index first, Index last, kernels::NeighbourScratch& scratch) {
-        fit_planes(surface[side], first, last, scratch);
-      });
+  const auto tasks = [&](Index side) {
+    return (surface[side].index.leaves() + leaves_per_task - 1) / leaves_per_task;
+  };
+  parallel_for_parts(w.threads, w.sides, tasks, [&](Index side, Index task, int thread) {
+    Surface& s = surface[side];
+    const Index first = task * leaves_per_task;
+    fit_planes(s, first, std::min(first + leaves_per_task, s.index.leaves()),
+               w.scratch[static_cast<std::size_t>(thread)].neighbours);
+  });
   parallel_for_parts(w.threads, w.sides, whole, [&](Index side, Index, int) {
     Surface& s = surface[side];
     s.spacing = std::sqrt(median(s.spread_squared.data(), s.count) /
@@ -262,12 +260,14 @@ bool build_surfaces(Workspace& w) noexcept {
   const float spacing = std::max({smallest_spacing, surface[0].spacing, surface[1].spacing});
   w.verified.spacing = spacing;
   // How far the grids are exact depends on both clouds: no part of a prepared one.
-  const float reach = reach_in_spacings * spacing;
-  for (Surface& s : w.verified.surface) s.grid.place(s.index, reach, reach);
-  for_each_chunk(
-      w, both_sides, blocks_per_task, [&](Index side) { return surface[side].grid.blocks(); },
-      [&](Index side, Index first, Index last, kernels::NeighbourScratch& scratch) {
-        surface[side].grid.fill(surface[side].index, first, last, scratch);
+  for (Surface& s : w.verified.surface) {
+    s.grid.place(s.index, margin_in_spacings * spacing, reach_in_spacings * spacing);
+  }
+  parallel_for_parts(
+      w.threads, both_sides, [&](Index side) { return surface[side].grid.slabs(); },
+      [&](Index side, Index slab, int thread) {
+        surface[side].grid.fill(surface[side].index, slab,
+                                w.scratch[static_cast<std::size_t>(thread)].neighbours);
       });
   return true;
 }

@@ -45,7 +45,8 @@ struct Surface {
   kernels::SpatialIndex index;  // of the points given
   kernels::NearestGrid grid;
 
-  kernels::Floats flat_x, flat_y, flat_z;  // while the planes are fitted
+  std::vector<std::uint32_t> order;        // the points in spatial order, while the index is built
+  kernels::Floats flat_x, flat_y, flat_z;  // places in that order, then points in their planes
   kernels::Floats height;                  // of the points given over their planes
 
   Surface() = default;

@@ -31,4 +31,20 @@ void for_each_within(const float* values, Index count, float limit, const Use& u
   }
 }
 
+/// The same for any count, where many numbers are within the limit, here and there: lists them
+/// without a branch that they decide.
+template <class Use>
+void for_each_listed(const float* values, Index count, float limit, const Use& use) noexcept {
+  constexpr Index chunk = 256;
+  std::uint16_t listed[chunk];
+  for (Index first = 0; first < count; first += chunk) {
+    Index found = 0;
+    for (Index i = 0; i < std::min(chunk, count - first); ++i) {
+      listed[found] = static_cast<std::uint16_t>(i);
+      found += values[first + i] <= limit ? 1 : 0;
+    }
+    for (Index i = 0; i < found; ++i) use(first + listed[i]);
+  }
+}
+
 }  // namespace vnreg::kernels

@@ -2,107 +2,101 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-
-#include "kernels/list_within.hpp"
 
 namespace vnreg::kernels {
 namespace {
 
-constexpr Index part = NearestGrid::part;
-constexpr Index part_cells = part * part * part;
-constexpr float infinity = std::numeric_limits<float>::infinity();
+using Eigen::internal::pcmp_lt;
+using Eigen::internal::ploadu;
+using Eigen::internal::plset;
+using Eigen::internal::pmadd;
+using Eigen::internal::pselect;
+using Eigen::internal::pset1;
+using Eigen::internal::pstoreu;
+using Eigen::internal::psub;
 
-/// From the centre of a cube of `side` cells to the farthest centre of its cells.
-float radius_of(Index side, float size) noexcept {
-  return std::sqrt(3.0f) * 0.5f * static_cast<float>(side - 1) * size;
-}
+constexpr Index layers = NearestGrid::block;
+constexpr Index most_cells = NearestGrid::cells;
+// A packet may begin at the last cell of a row.
+constexpr Index row_stride = most_cells + packet_size;
+constexpr float no_point = -1.0f;
+// Of cells and of distances: more than rounding.
+constexpr float slack = 1e-3f;
 
-/// Squared distances from q to the first `count` points of the scratch; returns the least.
-float measure(const float q[3], Index count, const NeighbourScratch& s, float* squared) noexcept {
-  const float qx = q[0], qy = q[1], qz = q[2];
-  const float *x = s.x.data(), *y = s.y.data(), *z = s.z.data();
-  float least = infinity;
-#pragma omp simd reduction(min : least)
-  for (Index i = 0; i < count; ++i) {
-    const float dx = x[i] - qx, dy = y[i] - qy, dz = z[i] - qz;
-    squared[i] = (dx * dx + dy * dy) + dz * dz;
-    least = squared[i] < least ? squared[i] : least;
-  }
-  return least;
-}
+/// The cells of an axis whose centres are within `reach` of a coordinate.
+struct Range {
+  Index first, last;
 
-/// The squared distance from q to the nearest point. Leaves the bounds of all leaves in `bounds`.
-float nearest_distance(const SpatialIndex& index, const float q[3], float* bounds) noexcept {
-  index.leaf_bounds(q[0], q[1], q[2], bounds);
-  const auto within = [&](Index leaf) {
-    alignas(64) float squared[SpatialIndex::leaf_size];
-    index.leaf_distances(leaf, q[0], q[1], q[2], squared);
-    return *std::min_element(squared, squared + SpatialIndex::leaf_size);
-  };
-  const Index start = std::min_element(bounds, bounds + index.leaves()) - bounds;
-  float least = within(start);
-  for (Index leaf = 0; leaf < index.leaves(); ++leaf) {
-    if (bounds[leaf] < least && leaf != start) least = std::min(least, within(leaf));
-  }
-  return least;
-}
-
-/// Copies the leaves that may hold points within `limit_squared`; returns their number of points,
-/// a multiple of the leaf size.
-Index gather_candidates(const SpatialIndex& index, float limit_squared,
-                        NeighbourScratch& s) noexcept {
-  constexpr Index leaf_size = SpatialIndex::leaf_size;
-  const Coordinates points = index.ordered();
-  Index count = 0;
-  for (Index leaf = 0; leaf < index.leaves(); ++leaf) {
-    if (s.bounds[static_cast<std::size_t>(leaf)] > limit_squared) continue;
-    const Index first = leaf * leaf_size;
-    std::copy_n(points.x + first, leaf_size, s.x.data() + count);
-    std::copy_n(points.y + first, leaf_size, s.y.data() + count);
-    std::copy_n(points.z + first, leaf_size, s.z.data() + count);
-    std::copy_n(index.original() + first, leaf_size, s.original.data() + count);
-    count += leaf_size;
-  }
-  return count;
-}
-
-/// The centres of a part's cells and what is nearest to them so far.
-struct Cells {
-  alignas(64) float x[part_cells], y[part_cells], z[part_cells];
-  alignas(64) float squared[part_cells];
-  alignas(64) std::int32_t point[part_cells];
-
-  Cells(const float first_centre[3], float size) noexcept {
-    for (Index i = 0; i < part_cells; ++i) {
-      x[i] = first_centre[0] + size * static_cast<float>(i % part);
-      y[i] = first_centre[1] + size * static_cast<float>(i / part % part);
-      z[i] = first_centre[2] + size * static_cast<float>(i / (part * part));
-    }
-    std::fill_n(squared, part_cells, infinity);
-    std::fill_n(point, part_cells, 0);
-  }
-
-  void offer(float px, float py, float pz, std::int32_t candidate) noexcept {
-#pragma omp simd
-    for (Index i = 0; i < part_cells; ++i) {
-      const float dx = px - x[i], dy = py - y[i], dz = pz - z[i];
-      const float distance = (dx * dx + dy * dy) + dz * dz;
-      const bool nearer = distance < squared[i];
-      squared[i] = nearer ? distance : squared[i];
-      point[i] = nearer ? candidate : point[i];
-    }
-  }
+  /// `place` is the coordinate in cells from the first centre, `reach` in cells too.
+  Range(float place, float reach, Index cells) noexcept
+      : first(std::max<Index>(0, static_cast<Index>(std::ceil(place - reach - slack)))),
+        last(std::min(cells - 1, static_cast<Index>(std::floor(place + reach + slack)))) {}
 };
 
-/// Who is nearest to the centre of some cell of a cube is at most `distance` + `radius` from it,
-/// and so at most this far from the cube's centre; with room for rounding.
-float candidates_limit(float distance, float radius) noexcept {
-  const float limit = (distance + 2 * radius) * 1.00001f;
-  return limit * limit;
-}
-
 }  // namespace
+
+/// The layers of a slab while points are offered to their cells. A cell keeps the nearest point
+/// within the reach; of equally near ones, the first.
+class NearestGrid::Slab {
+ public:
+  Slab(const NearestGrid& grid, Index first_layer) noexcept
+      : grid_(grid), first_layer_(first_layer), reach_squared_(grid.reach_ * grid.reach_) {
+    std::fill_n(&squared_[0][0][0], layers * most_cells * row_stride, reach_squared_ * (1 + slack));
+    std::fill_n(&point_[0][0][0], layers * most_cells * row_stride, no_point);
+  }
+
+  /// The distance from the slab of what lies at z: squared, 0 inside.
+  float distance_squared(float low, float high) const noexcept {
+    const float first = grid_.centre(2, first_layer_);
+    const float last = grid_.centre(2, first_layer_ + layers - 1);
+    const float outside = std::max({first - high, low - last, 0.0f});
+    return outside * outside;
+  }
+  bool reaches(float low, float high) const noexcept {
+    return distance_squared(low, high) <= reach_squared_ * (1 + slack);
+  }
+
+  void offer(const float p[3], std::uint32_t number) noexcept {
+    const float reach = grid_.reach_ * grid_.per_size_;
+    const Range columns(grid_.place_of(0, p[0]), reach, grid_.counts_[0]);
+    const Range rows(grid_.place_of(1, p[1]), reach, grid_.counts_[1]);
+    for (Index layer = 0; layer < layers; ++layer) {
+      const float dz = grid_.centre(2, first_layer_ + layer) - p[2];
+      for (Index row = rows.first; row <= rows.last; ++row) {
+        const float dy = grid_.centre(1, row) - p[1];
+        const float across = dy * dy + dz * dz;
+        if (across > reach_squared_ * (1 + slack)) continue;
+        offer_row(p[0], across, static_cast<float>(number), columns, squared_[layer][row],
+                  point_[layer][row]);
+      }
+    }
+  }
+
+  /// A place in the input of the index; negative where no point is within reach.
+  const float* points(Index layer, Index row) const noexcept { return point_[layer][row]; }
+
+ private:
+  void offer_row(float x, float across, float number, const Range& columns, float* squared,
+                 float* point) const noexcept {
+    const Packet step = plset<Packet>(0.0f);
+    for (Index i = columns.first; i <= columns.last; i += packet_size) {
+      const Packet centre =
+          pmadd(step, pset1<Packet>(grid_.size_), pset1<Packet>(grid_.centre(0, i)));
+      const Packet dx = psub(centre, pset1<Packet>(x));
+      const Packet distance = pmadd(dx, dx, pset1<Packet>(across));
+      const Packet before = ploadu<Packet>(squared + i);
+      const Packet nearer = pcmp_lt(distance, before);
+      pstoreu(squared + i, pselect(nearer, distance, before));
+      pstoreu(point + i, pselect(nearer, pset1<Packet>(number), ploadu<Packet>(point + i)));
+    }
+  }
+
+  const NearestGrid& grid_;
+  Index first_layer_;
+  float reach_squared_;
+  alignas(64) float squared_[layers][most_cells][row_stride];
+  alignas(64) float point_[layers][most_cells][row_stride];  // exact: below 2^24
+};
 
 void NearestGrid::place(const SpatialIndex& index, float margin, float reach) noexcept {
   const Coordinates points = index.ordered();
@@ -128,74 +122,44 @@ void NearestGrid::place(const SpatialIndex& index, float margin, float reach) no
   reach_ = reach;
 }
 
-void NearestGrid::fill(const SpatialIndex& index, Index first, Index last,
-                       NeighbourScratch& scratch) noexcept {
-  const Index blocks_x = counts_[0] / block;
-  const Index blocks_y = counts_[1] / block;
-  for (Index b = first; b < last; ++b) {
-    const Index corner[3] = {b % blocks_x * block, b / blocks_x % blocks_y * block,
-                             b / (blocks_x * blocks_y) * block};
-    fill_block(index, corner, scratch);
+void NearestGrid::fill(const SpatialIndex& index, Index slab, NeighbourScratch& scratch) noexcept {
+  constexpr Index leaf_size = SpatialIndex::leaf_size;
+  const Coordinates points = index.ordered();
+  Slab held(*this, slab * block);
+  for (Index leaf = 0; leaf < index.leaves(); ++leaf) {
+    const Box box = index.box(leaf);
+    if (!held.reaches(box.low[2], box.high[2])) continue;
+    const Index first = leaf * leaf_size;
+    for (Index i = first; i < std::min(first + leaf_size, index.count()); ++i) {
+      const float p[3] = {points.x[i], points.y[i], points.z[i]};
+      if (held.reaches(p[2], p[2])) held.offer(p, index.original()[i]);
+    }
   }
+  store(index, held, slab * block, scratch);
 }
 
-void NearestGrid::fill_block(const SpatialIndex& index, const Index corner[3],
-                             NeighbourScratch& scratch) noexcept {
-  const float radius = radius_of(block, size_);
-  float middle[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    middle[axis] = centre(axis, corner[axis]) + 0.5f * static_cast<float>(block - 1) * size_;
-  }
-  const float nearest = nearest_distance(index, middle, scratch.bounds.data());
-  const float distance = std::sqrt(nearest);
-  const bool far = distance > reach_ + radius;
-  const float limit = far ? nearest * 1.00001f : candidates_limit(distance, radius);
-  const Index count = gather_candidates(index, limit, scratch);
-  float* squared = scratch.squared.data();
-  if (far) {
-    const float least = measure(middle, count, scratch, squared);
-    const auto found = std::find(squared, squared + count, least) - squared;
-    store(corner, block, scratch.original.data() + found, 0);
-    return;
-  }
-  for (Index i = 0; i < block * block * block; i += part_cells) {
-    constexpr Index parts = block / part;
-    const Index p = i / part_cells;
-    const Index part_corner[3] = {corner[0] + p % parts * part,
-                                  corner[1] + p / parts % parts * part,
-                                  corner[2] + p / (parts * parts) * part};
-    fill_part(scratch, count, part_corner, squared);
-  }
-}
-
-void NearestGrid::fill_part(const NeighbourScratch& candidates, Index count, const Index corner[3],
-                            float* squared) noexcept {
-  const float radius = radius_of(part, size_);
-  float first_centre[3], middle[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    first_centre[axis] = centre(axis, corner[axis]);
-    middle[axis] = first_centre[axis] + 0.5f * static_cast<float>(part - 1) * size_;
-  }
-  const float nearest = measure(middle, count, candidates, squared);
-  const float distance = std::sqrt(nearest);
-  const bool far = distance > reach_ + radius;
-  Cells held(first_centre, size_);
-  for_each_within(squared, count, far ? nearest : candidates_limit(distance, radius), [&](Index i) {
-    const auto at = static_cast<std::size_t>(i);
-    held.offer(candidates.x[at], candidates.y[at], candidates.z[at], candidates.original[at]);
-  });
-  store(corner, part, held.point, 1);
-}
-
-/// Cell i of a cube takes points[i * step].
-void NearestGrid::store(const Index corner[3], Index side, const std::int32_t* points,
-                        Index step) noexcept {
-  for (Index i = 0; i < side * side * side; ++i) {
-    const Index x = corner[0] + i % side;
-    const Index y = corner[1] + i / side % side;
-    const Index z = corner[2] + i / (side * side);
-    nearest_[static_cast<std::size_t>((z * counts_[1] + y) * counts_[0] + x)] =
-        static_cast<std::uint16_t>(points[i * step]);
+/// Writes the points of the slab's cells; what no point reaches takes the point nearest to the
+/// middle of its block.
+void NearestGrid::store(const SpatialIndex& index, const Slab& slab, Index first_layer,
+                        NeighbourScratch& scratch) noexcept {
+  const Index blocks = counts_[0] / block;
+  for (Index b = 0; b < blocks * counts_[1] / block; ++b) {
+    const Index column = b % blocks * block, row = b / blocks * block;
+    std::uint16_t far = 0;
+    bool searched = false;
+    for (Index i = 0; i < block * block * block; ++i) {
+      const Index x = column + i % block, y = row + i / block % block, layer = i / (block * block);
+      const float point = slab.points(layer, y)[x];
+      if (point < 0 && !searched) {
+        const float half = 0.5f * static_cast<float>(block - 1) * size_;
+        const float middle[3] = {centre(0, column) + half, centre(1, row) + half,
+                                 centre(2, first_layer) + half};
+        nearest_places(index, {middle, middle + 1, middle + 2}, 1, scratch, &far);
+        searched = true;
+      }
+      nearest_[static_cast<std::size_t>(((first_layer + layer) * counts_[1] + y) * counts_[0] +
+                                        x)] = point < 0 ? far : static_cast<std::uint16_t>(point);
+    }
   }
 }
 

@@ -19,25 +19,22 @@ class NearestGrid {
  public:
   /// Cells along the longest side of the box. A multiple of `block`.
   static constexpr Index cells = 28;
-  /// Cells along the sides of the cubes that share a search for what may be nearest.
+  /// Cells along the sides of the cubes that share a point where all points are far.
   static constexpr Index block = 4;
-  /// Cells along the sides of a part of a block: of a packet's size.
-  static constexpr Index part = 2;
 
   /// Allocates for clouds of at most 65,536 points.
   void allocate() { nearest_.resize(static_cast<std::size_t>(cells * cells * cells)); }
 
   /// Lays cubic cells over the bounding box of the points, widened by `margin` (positive) on all
-  /// sides. Within a block, or a part of it, whose cells' centres are all farther than `reach` from
-  /// every point, all cells hold the point nearest to its centre: the bound above then does not
-  /// hold.
+  /// sides. Cells whose centres are farther than `reach` from every point hold the point nearest to
+  /// the centre of their block: the bound above then does not hold.
   void place(const SpatialIndex& index, float margin, float reach) noexcept;
-  /// Searches for the cells of the blocks [first, last) of blocks(). Blocks are independent.
-  void fill(const SpatialIndex& index, Index first, Index last, NeighbourScratch& scratch) noexcept;
+  /// Finds the points of a slab of blocks across z, one of slabs(). Slabs are independent.
+  void fill(const SpatialIndex& index, Index slab, NeighbourScratch& scratch) noexcept;
 
-  Index blocks() const noexcept {
-    return counts_[0] * counts_[1] * counts_[2] / (block * block * block);
-  }
+  Index slabs() const noexcept { return counts_[2] / block; }
+  /// How many cells there are.
+  Index size() const noexcept { return counts_[0] * counts_[1] * counts_[2]; }
   float cell_size() const noexcept { return size_; }
 
   /// A place in the input of the index. Outside of the box: that of the cell of the box nearest by.
@@ -48,11 +45,13 @@ class NearestGrid {
   void nearest(const Coordinates& queries, Index count, std::uint16_t* places) const noexcept;
 
  private:
-  void fill_block(const SpatialIndex& index, const Index corner[3],
-                  NeighbourScratch& scratch) noexcept;
-  void fill_part(const NeighbourScratch& candidates, Index count, const Index corner[3],
-                 float* squared) noexcept;
-  void store(const Index corner[3], Index side, const std::int32_t* points, Index step) noexcept;
+  class Slab;
+  void store(const SpatialIndex& index, const Slab& slab, Index first_layer,
+             NeighbourScratch& scratch) noexcept;
+  /// In cells from the centre of the first.
+  float place_of(int axis, float value) const noexcept {
+    return (value - low_[axis]) * per_size_ - 0.5f;
+  }
   float centre(int axis, Index cell) const noexcept {
     return low_[axis] + (static_cast<float>(cell) + 0.5f) * size_;
   }

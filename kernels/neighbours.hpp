@@ -8,13 +8,22 @@
 
 namespace vnreg::kernels {
 
+/// Points that may be near to the queries at hand: a multiple of the leaf size.
+struct Candidates {
+  Index count = 0;
+  Floats x, y, z;
+  std::vector<std::int32_t> original;  // places in the input
+  Floats squared;                      // distances from one query
+
+  Candidates() = default;
+  explicit Candidates(std::size_t points);
+};
+
 /// Working memory of one thread.
 struct NeighbourScratch {
-  Floats bounds, far_bounds;  // one per leaf
-  // The points of the leaves that may matter to the queries at hand.
-  Floats x, y, z;
-  std::vector<std::int32_t> original;
-  Floats squared;                  // their distances from one query
+  Floats bounds, far_bounds;       // one per leaf
+  Candidates all;                  // whole leaves
+  Candidates near;                 // of these, the points near to all queries
   std::vector<std::int32_t> tied;  // those at the distance of the k-th nearest
 
   NeighbourScratch() = default;
@@ -38,6 +47,11 @@ void nearest_points(const SpatialIndex& index, Index k, Index first_leaf, Index 
 /// infinite when there is none.
 void nearest_others(const SpatialIndex& index, Index first_leaf, Index last_leaf,
                     NeighbourScratch& scratch, float* squared) noexcept;
+
+/// places[i] = the place in the input of the point nearest to query i, of equally near ones the
+/// lowest. For indices of at most 65,536 points; fast like nearest_distances().
+void nearest_places(const SpatialIndex& index, const Coordinates& queries, Index count,
+                    NeighbourScratch& scratch, std::uint16_t* places) noexcept;
 
 /// squared[i] = squared distance from query i to the nearest point of the index. Fast when
 /// consecutive queries are near each other, as in the order of another index.

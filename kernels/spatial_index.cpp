@@ -6,9 +6,6 @@
 namespace vnreg::kernels {
 namespace {
 
-// Its square overflows to infinity, so padding is beyond every finite bound.
-constexpr float beyond = 1e30f;
-
 inline float squared_distance(float dx, float dy, float dz) noexcept {
   return (dx * dx + dy * dy) + dz * dz;
 }
@@ -75,6 +72,21 @@ void SpatialIndex::store() noexcept {
     z_[at] = items[i].position[2];
     original_[at] = items[i].original;
   }
+  finish();
+}
+
+void SpatialIndex::build_ordered(const Coordinates& points, const std::uint32_t* original,
+                                 Index count) noexcept {
+  count_ = count;
+  std::copy_n(points.x, count, x_.begin());
+  std::copy_n(points.y, count, y_.begin());
+  std::copy_n(points.z, count, z_.begin());
+  std::copy_n(original, count, original_.begin());
+  finish();
+}
+
+/// Boxes, and the padding of the last leaf.
+void SpatialIndex::finish() noexcept {
   store_boxes();
   for (auto i = static_cast<std::size_t>(count_);
        i < static_cast<std::size_t>(leaves() * leaf_size); ++i) {

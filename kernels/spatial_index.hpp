@@ -32,6 +32,8 @@ Box box_of(const Coordinates& points, Index count) noexcept;
 class SpatialIndex {
  public:
   static constexpr Index leaf_size = 16;
+  /// Where padding lies: its square overflows to infinity, so it is beyond every finite bound.
+  static constexpr float beyond = 1e30f;
 
   SpatialIndex() = default;
   /// Allocates for at most `max_points` points.
@@ -47,6 +49,10 @@ class SpatialIndex {
     take(points, count);
     if (split(0, count, stop)) store();
   }
+  /// The same from points that are in such an order already, as every so many of another index are;
+  /// original()[i] becomes original[i].
+  void build_ordered(const Coordinates& points, const std::uint32_t* original,
+                     Index count) noexcept;
 
   Index count() const noexcept { return count_; }
   Index leaves() const noexcept { return (count_ + leaf_size - 1) / leaf_size; }
@@ -77,6 +83,7 @@ class SpatialIndex {
   Index halve(Index first, Index last) noexcept;
   void split(Index first, Index last) noexcept;
   void store() noexcept;
+  void finish() noexcept;
   void store_boxes() noexcept;
 
   /// False when it was stopped.

@@ -55,4 +55,16 @@ inline float nearest_distance(const Coordinates& points, Index count, const Coor
   return nearest;
 }
 
+/// The point nearest to the query, of equally near ones the first.
+inline Index nearest_place(const Coordinates& points, Index count, const Coordinates& queries,
+                           Index q) {
+  Index nearest = 0;
+  for (Index j = 1; j < count; ++j) {
+    if (squared_distance(points, j, queries, q) < squared_distance(points, nearest, queries, q)) {
+      nearest = j;
+    }
+  }
+  return nearest;
+}
+
 }  // namespace vnreg::kernels::reference

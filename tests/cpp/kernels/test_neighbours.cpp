@@ -165,6 +165,85 @@ TEST_CASE("the order of the index is a permutation in leaves whose boxes hold") 
   }
 }
 
+TEST_CASE("lists of neighbours hold the k nearest, ties by lower index") {
+  Random random(68);
+  constexpr Index k = 14;
+  for (const Index count : {14, 17, 65, 333, 1024}) {
+    for (const PointSet& points : {gaussian(count, random), lattice(count, random),
+                                   clusters(count, random), all_equal(count)}) {
+      SpatialIndex index(count);
+      index.build(points.coordinates(), count);
+      NeighbourScratch scratch(count);
+      std::vector<std::uint16_t> lists(static_cast<std::size_t>(k * count));
+      nearest_points(index, k, 0, index.leaves(), scratch, lists.data());
+      for (Index i = 0; i < count; ++i) {
+        std::vector<Index> expected = reference::by_distance(points.coordinates(), count, i);
+        expected.resize(static_cast<std::size_t>(k));
+        std::vector<Index> found(lists.begin() + k * i, lists.begin() + k * (i + 1));
+        std::sort(expected.begin(), expected.end());
+        std::sort(found.begin(), found.end());
+        CAPTURE(count, i);
+        REQUIRE(found == expected);
+      }
+    }
+  }
+}
+
+TEST_CASE("nearest places equal the full search, the first of equally near ones") {
+  Random random(66);
+  for (const Index count : {1, 2, 3, 7, 63, 64, 65, 333}) {
+    for (const PointSet& points :
+         {gaussian(count, random), lattice(count, random), all_equal(count)}) {
+      SpatialIndex index(count);
+      index.build(points.coordinates(), count);
+      NeighbourScratch scratch(count);
+      for (const PointSet& queries : {gaussian(65, random), lattice(333, random), points}) {
+        constexpr std::uint16_t sentinel = 65535;
+        std::vector<std::uint16_t> places(queries.x.size() + 16, sentinel);
+        nearest_places(index, queries.coordinates(), queries.count(), scratch, places.data());
+        for (Index q = 0; q < queries.count(); ++q) {
+          CAPTURE(count, q);
+          REQUIRE(places[static_cast<std::size_t>(q)] ==
+                  reference::nearest_place(points.coordinates(), count, queries.coordinates(), q));
+        }
+        REQUIRE(std::all_of(places.begin() + queries.count(), places.end(),
+                            [](std::uint16_t v) { return v == sentinel; }));
+      }
+    }
+  }
+}
+
+TEST_CASE("an index of every so many points of another in its order searches like its own") {
+  Random random(67);
+  const PointSet points = clusters(1000, random);
+  SpatialIndex whole(1000);
+  whole.build(points.coordinates(), 1000);
+  for (const Index count : {1, 15, 16, 17, 333, 1000}) {
+    PointSet chosen(count);
+    std::vector<std::uint32_t> original;
+    for (Index i = 0; i < count; ++i) {
+      const Index from = i * 1000 / count;
+      const Coordinates o = whole.ordered();
+      chosen.set(i, o.x[from], o.y[from], o.z[from]);
+      original.push_back(static_cast<std::uint32_t>(count - 1 - i));
+    }
+    SpatialIndex index(1000);
+    index.build(points.coordinates(), 1000);  // nothing of it may be left
+    index.build_ordered(chosen.coordinates(), original.data(), count);
+    REQUIRE(index.count() == count);
+    NeighbourScratch scratch(1000);
+    const PointSet queries = gaussian(65, random);
+    std::vector<std::uint16_t> places(65);
+    nearest_places(index, queries.coordinates(), 65, scratch, places.data());
+    for (Index q = 0; q < 65; ++q) {
+      const Index nearest =
+          reference::nearest_place(chosen.coordinates(), count, queries.coordinates(), q);
+      CAPTURE(count, q);
+      REQUIRE(places[static_cast<std::size_t>(q)] == count - 1 - nearest);
+    }
+  }
+}
+
 TEST_CASE("nearest distances equal the full search, whatever the order of the queries") {
   Random random(64);
   for (const Index count : {1, 2, 3, 7, 63, 64, 65, 333, 1024}) {
