@@ -111,26 +111,37 @@ void record(const ScoredPose* poses, const double* first, const double* judged, 
                     judge_point_inputs, count * columns);
 }
 
+/// Log-odds of all poses, at the first look and in the end.
+void judge_all(const ScoredPose* poses, Index count, double* first, double* judged,
+               Workspace& w) noexcept {
+  if (w.verified.judge.model == nullptr || count == 0) return;
+  Index all[final_poses];
+  std::iota(all, all + count, Index{0});
+  describe_judged_points(0, judged_points, w);
+  look({all, static_cast<std::size_t>(count)}, judged_points, poses, first, w);
+  std::copy_n(first, count, judged);
+  if (!w.deadline.expired()) look_closer(poses, count, judged, w);
+}
+
 }  // namespace
 
 bool judge_poses(ScoredPose* poses, Index count, Workspace& w) noexcept {
-  JudgeWorkspace& judge = w.verified.judge;
-  const bool recording = w.recorder.enabled();
-  if (judge.scratch.empty() || (judge.model == nullptr && !recording)) return false;
+  const JudgeWorkspace& judge = w.verified.judge;
+  if (judge.scratch.empty() || judge.model == nullptr) return false;
   choose_judged_points(w);
   double first[final_poses] = {}, judged[final_poses] = {};
-  if (judge.model != nullptr && count > 0) {
-    Index all[final_poses];
-    std::iota(all, all + count, Index{0});
-    describe_judged_points(0, judged_points, w);
-    look({all, static_cast<std::size_t>(count)}, judged_points, poses, first, w);
-    std::copy_n(first, count, judged);
-    if (!w.deadline.expired()) look_closer(poses, count, judged, w);
-  }
-  if (recording) record(poses, first, judged, count, w);
-  if (judge.model == nullptr || w.deadline.expired()) return false;
+  judge_all(poses, count, first, judged, w);
+  if (w.deadline.expired()) return false;
   for (Index i = 0; i < count; ++i) poses[i].score = judged[i];
   return true;
+}
+
+void record_judgement(const ScoredPose* fits, Index count, Workspace& w) noexcept {
+  if (w.verified.judge.scratch.empty() || !w.recorder.enabled()) return;
+  choose_judged_points(w);
+  double first[final_poses] = {}, judged[final_poses] = {};
+  judge_all(fits, count, first, judged, w);
+  record(fits, first, judged, count, w);
 }
 
 }  // namespace vnreg::detail

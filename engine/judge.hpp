@@ -12,4 +12,7 @@ namespace vnreg::detail {
 /// pair's surfaces, descriptors and matches.
 bool judge_poses(ScoredPose* poses, Index count, Workspace& workspace) noexcept;
 
+/// Where stages are recorded: what the judge is trained on, of poses with the scores of their fits.
+void record_judgement(const ScoredPose* fits, Index count, Workspace& workspace) noexcept;
+
 }  // namespace vnreg::detail

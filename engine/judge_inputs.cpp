@@ -263,7 +263,7 @@ void write_side(const View& v, Index count, JudgeScratch& s, float* out) noexcep
 
 void choose_judged_points(Workspace& w) noexcept {
   VerifiedWorkspace& v = w.verified;
-  parallel_for(w.threads, 2, [&](Index side, int) {
+  parallel_for(w.threads, 2, [&](Index side, int thread) {
     const Surface& s = v.surface[side];
     const CloudDescriptors& d = w.descriptors.features[side].out;
     JudgedCloud& c = v.judge.cloud[side];

@@ -21,7 +21,7 @@ struct JudgedCloud {
   Surface points;                                  // places and normals only
   std::uint16_t encoded[most_judged_points] = {};  // which descriptor is theirs
   kernels::Surroundings own[most_judged_points][kernels::surroundings_radii];
-  kernels::SpatialIndex described;                 // of the encoded points
+  kernels::SpatialIndex described;             // of the encoded points
   std::vector<std::uint16_t> nearest_encoded;  // of every point of the cloud's surface
   kernels::Floats log_sum;  // per encoded point: log of the sum of exp(similarity) over the others
 

@@ -5,7 +5,7 @@
 
 namespace vnreg::detail {
 
-/// A multiple of two packets.
+/// A multiple of three packets.
 inline constexpr std::ptrdiff_t half_space_directions = 96;
 
 /// Unit vectors.

@@ -21,7 +21,7 @@ inline constexpr Index kept_per_chunk = 64;
 /// Poses that other registers may add to the hypotheses.
 inline constexpr Index most_proposals = 2;
 /// Distinct hypotheses that are refined.
-inline constexpr Index refined_poses = 64;
+inline constexpr Index refined_poses = 40;
 /// Distinct poses that are refined on all points.
 inline constexpr Index final_poses = 12;
 

@@ -138,29 +138,33 @@ float sum_of_nearness(const Motion& motion, const Surface surface[2], Index firs
   return (1 - squared * (1 / (tolerance * tolerance))).max(0.0f).sum();
 }
 
-/// Of the first points of `moving`.
-Fit one_sided_fit(const Motion& motion, const Surface& moving, const Surface& fixed, Index points,
-                  float tolerance, Search search) noexcept {
-  const Index total = std::min(points, moving.count);
-  const float limit = 9 * tolerance * tolerance;
-  Matches matches;
+/// How well the first points of `moving` lie on `fixed`, and those without a match.
+struct OneSidedFit {
+  float per_point;
+  float agreement = 0;
   Unmatched unmatched;
-  Fit fit;
-  for (Index first = 0; first < total; first += Matches::capacity) {
-    match_points(motion, moving, first, std::min(Matches::capacity, total - first), fixed, search,
-                 matches);
-    fit.agreement += sum_of_agreement(matches, tolerance);
-    unmatched.add(matches, limit);
+
+  OneSidedFit(const Motion& motion, const Surface& moving, const Surface& fixed, Index points,
+              float tolerance, Search search) noexcept {
+    const Index total = std::min(points, moving.count);
+    per_point = 1 / static_cast<float>(total);
+    Matches matches;
+    for (Index first = 0; first < total; first += Matches::capacity) {
+      match_points(motion, moving, first, std::min(Matches::capacity, total - first), fixed, search,
+                   matches);
+      agreement += sum_of_agreement(matches, tolerance);
+      unmatched.add(matches, 9 * tolerance * tolerance);
+    }
+    agreement *= per_point;
   }
-  const float per_point = 1 / static_cast<float>(total);
-  fit.agreement *= per_point;
-  fit.unmatched = static_cast<float>(unmatched.count) * per_point;
-  fit.beyond = static_cast<float>(most_beyond({unmatched.x, unmatched.y, unmatched.z},
-                                              unmatched.count, fixed.extents)
-                                      .count) *
-               per_point;
-  return fit;
-}
+
+  float unmatched_share() const noexcept { return static_cast<float>(unmatched.count) * per_point; }
+  float beyond_share(const Extents& extents) const noexcept {
+    const HalfSpace most =
+        most_beyond({unmatched.x, unmatched.y, unmatched.z}, unmatched.count, extents);
+    return static_cast<float>(most.count) * per_point;
+  }
+};
 
 }  // namespace
 
@@ -173,11 +177,13 @@ void match_points(const Motion& motion, const Surface& moving, Index first, Inde
 }
 
 Fit two_sided_fit(const Motion& motion, const Surface surface[2], Index points, float tolerance,
-                  Search search) noexcept {
-  const Fit a = one_sided_fit(motion, surface[0], surface[1], points, tolerance, search);
-  const Fit b = one_sided_fit(inverse(motion), surface[1], surface[0], points, tolerance, search);
-  return {(a.agreement + b.agreement) / 2, (a.unmatched + b.unmatched) / 2,
-          (a.beyond + b.beyond) / 2};
+                  Search search, float least) noexcept {
+  const OneSidedFit a(motion, surface[0], surface[1], points, tolerance, search);
+  const OneSidedFit b(inverse(motion), surface[1], surface[0], points, tolerance, search);
+  Fit fit{(a.agreement + b.agreement) / 2, (a.unmatched_share() + b.unmatched_share()) / 2, 0};
+  if (fit.agreement < least) return fit;
+  fit.beyond = (a.beyond_share(surface[1].extents) + b.beyond_share(surface[0].extents)) / 2;
+  return fit;
 }
 
 float probe(const Motion& motion, const Surface surface[2], float tolerance) noexcept {

@@ -1,6 +1,8 @@
 // How well a pose explains both surfaces, and the matches that it is judged by.
 #pragma once
 
+#include <limits>
+
 #include "engine/motion.hpp"
 #include "engine/surface.hpp"
 
@@ -46,9 +48,9 @@ struct Fit {
 };
 
 /// Both ways, since a pose that folds one surface into a part of the other explains only one of
-/// them: the mean of both.
+/// them: the mean of both. Where the score cannot reach `least`, nothing counts as beyond.
 Fit two_sided_fit(const Motion& motion, const Surface surface[2], Index points, float tolerance,
-                  Search search) noexcept;
+                  Search search, float least = -std::numeric_limits<float>::infinity()) noexcept;
 
 /// How far a point may be from the surface to speak for a pose that is only probed, in spacings.
 inline constexpr float probe_tolerance = 2.4f;
