@@ -41,7 +41,7 @@ inline bool usable(const Point& p) noexcept {  // false for NaN, too
 }
 
 // Points between two looks at the clock: a fraction of a millisecond.
-constexpr std::size_t points_per_look = 8192;
+constexpr std::size_t points_per_look = 2048;
 
 bool time_is_up(std::size_t i, Deadline& deadline) noexcept {
   return i % points_per_look == 0 && deadline.passed();
@@ -49,7 +49,7 @@ bool time_is_up(std::size_t i, Deadline& deadline) noexcept {
 
 /// Sorts by index, in pieces of a fraction of a millisecond; stops short when the deadline passes.
 void sort_by_index(Cloud::Candidate* first, Cloud::Candidate* last, Deadline& deadline) noexcept {
-  constexpr std::ptrdiff_t sorted_at_once = 4096;
+  constexpr std::ptrdiff_t sorted_at_once = 2048;
   const auto earlier = [](const auto& a, const auto& b) { return a.index < b.index; };
   if (deadline.passed()) return;
   if (last - first <= sorted_at_once) return std::sort(first, last, earlier);
