@@ -65,18 +65,10 @@ std::uint64_t selection_key(std::uint64_t seed, std::uint64_t point) noexcept {
   return (counter_hash(seed, point) & ~std::uint64_t{0xffff}) | point;
 }
 
-// So many points are encoded where a cloud has them.
-constexpr Index fewest_encoded = 128;
-
-/// Two thirds of the points. Of a smaller share, clouds that share points see too few of the same.
-Index encoded_count(Index count, Index most) noexcept {
-  return std::min({count, most, std::max(2 * count / 3, fewest_encoded)});
-}
-
 /// The points with the smallest keys, in the spatial order of the index.
 void select_encoded(const Cloud& cloud, Index most, std::uint64_t seed,
                     DescriptorFeatures& f) noexcept {
-  const Index wanted = encoded_count(cloud.count, most);
+  const Index wanted = std::min(cloud.count, most);
   for (Index i = 0; i < cloud.count; ++i) {
     f.keys[static_cast<std::size_t>(i)] = selection_key(seed, static_cast<std::uint64_t>(i));
   }

@@ -118,10 +118,10 @@ def test_every_stage_equals_torch_in_float64(
         assert normalised_error(actual, expected) <= LIMIT, stage
 
 
-def test_two_thirds_of_the_points_are_encoded_and_no_more_than_the_file_says(
+def test_as_many_points_are_encoded_as_the_file_says(
     twin: Callable[[str], DescriptorTwin],
 ) -> None:
-    pair = make_test_pair(2, 1024, 225, noisy=False)
+    pair = make_test_pair(2, 1024, 150, noisy=False)
     stages = twin("odd").engine(pair.source, pair.target)
     for side, count in (("source", ENCODED), ("target", 150)):
         assert len(np.unique(stages[f"{side}.encoded"])) == count
@@ -176,8 +176,8 @@ def test_the_order_of_the_points_changes_rounding_only(
     twin: Callable[[str], DescriptorTwin],
 ) -> None:
     model = twin("default")
-    pair = make_test_pair(5, 128, 120, noisy=True)  # all are encoded
-    order = np.random.default_rng(0).permutation(128)
+    pair = make_test_pair(5, 180, 170, noisy=True)  # all are encoded
+    order = np.random.default_rng(0).permutation(180)
     straight = model.engine(pair.source, pair.target)
     shuffled = model.engine(pair.source[order], pair.target)
     for stage in (*INVARIANT, *EQUIVARIANT):
@@ -190,13 +190,13 @@ def test_far_points_change_no_local_descriptor(twin: Callable[[str], DescriptorT
     """Moving a part beyond moments and neighbourhood leaves the local branch as it was."""
     model = twin("default")
     rng = np.random.default_rng(6)
-    near = rng.normal(size=(64, 3)) * 0.1  # all 128 points are encoded
-    far = rng.normal(size=(64, 3)) * 0.1 + [4.0, 0, 0]
+    near = rng.normal(size=(80, 3)) * 0.1
+    far = rng.normal(size=(80, 3)) * 0.1 + [4.0, 0, 0]
     moved = far @ Rotation.random(rng=rng).as_matrix().T  # about the origin: to another place
     clouds = [np.concatenate([near, part]) for part in (far, moved)]
     # The rest of the frame: centroid and radius are of both clouds together, so they stay.
     stages = model.engine(clouds[0], clouds[1])
-    local = [by_index(stages, side, "descriptor.local")[:64] for side in ("source", "target")]
-    context = [by_index(stages, side, "descriptor.context")[:64] for side in ("source", "target")]
+    local = [by_index(stages, side, "descriptor.local")[:80] for side in ("source", "target")]
+    context = [by_index(stages, side, "descriptor.context")[:80] for side in ("source", "target")]
     assert normalised_error(local[1], local[0]) <= TURNED_LIMIT
     assert normalised_error(context[1], context[0]) > 1e-2
