@@ -40,23 +40,21 @@ TEST_CASE_METHOD(Clouds, "whatever the budget, a status and no pose or a rigid o
     for (int i = 0; i < 10; ++i) {
       whole_ms = std::min(whole_ms, unlimited.align(source, target).ms.total);
     }
-    int timed_out = 0, with_pose = 0;
+    int timed_out = 0;
     const auto align_within = [&](double share) {
       Registrar registrar(model, {.threads = threads, .time_budget_ms = share * whole_ms});
       const Result& result = registrar.align(source, target);
       CAPTURE(share, threads, to_string(result.status), result.ms.total);
       if (result.status != Status::timed_out) return;
       ++timed_out;
-      with_pose += result.has_pose;
       REQUIRE((!result.has_pose || is_rigid(result.T_target_source)));
       REQUIRE(std::isnan(result.confidence));
       REQUIRE(std::isnan(result.covariance[0]));
     };
     for (double share = 0.02; share < 0.97; share += 0.025) align_within(share);
-    // Poses come late; how late, on a busy machine, differs from call to call.
-    for (int i = 0; i < 500 && with_pose == 0; ++i) align_within(0.6 + 0.01 * (i % 60));
-    REQUIRE(timed_out > with_pose);  // some ended too early for a pose
-    REQUIRE(with_pose > 0);
+    // That some ends find a pose, and some come too early for one: test_looks.cpp, which does not
+    // depend on the time that a busy machine takes.
+    REQUIRE(timed_out > 0);
   }
 }
 
