@@ -120,3 +120,32 @@ def small_draft() -> Draft:
         + padded(struct.pack("<5i", -2, -1, 0, 1, 2))
         + padded(struct.pack("<9d", *(0.1 * i for i in range(9)))),
     )
+
+
+HUGE = 2**64 - 1
+# Larger than 64 bytes of data; the bytes of most do not fit 64 bits.
+WRAPPING_SHAPES: list[tuple[int, ...]] = [
+    (2**62,),
+    (2**62 + 1,),
+    (2**32, 2**32),
+    (2**31, 2**31),
+    (2**16,) * 4,
+    (2, 2**63),
+    (HUGE, HUGE),
+    (HUGE,) * 4,
+    (2**28 + 1,),
+    (17,),
+]
+
+
+def one_tensor(shape: tuple[int, ...], dtype: int = F32, data: bytes = bytes(64)) -> bytes:
+    return Draft(table=table_entry(b"w", dtype, shape, 0), tensor_count=1, data=data).build()
+
+
+def two_tensors(first: bytes, second: bytes, offsets: tuple[int, int] = (0, 64)) -> bytes:
+    table = table_entry(first, F32, (3,), offsets[0]) + table_entry(second, F32, (3,), offsets[1])
+    return Draft(table=table, tensor_count=2, data=bytes(128)).build()
+
+
+def with_metadata(metadata: bytes) -> bytes:
+    return Draft(metadata=metadata).build()

@@ -14,17 +14,22 @@ import pytest
 from file_builder import (
     F32,
     F64_TENSOR,
+    HUGE,
     I32,
+    WRAPPING_SHAPES,
     Draft,
     bool_entry,
     counted,
     crc32c,
     entry,
     f64_entry,
+    one_tensor,
     small_draft,
     string_entry,
     table_entry,
+    two_tensors,
     u64_entry,
+    with_metadata,
 )
 
 from vnreg_train.model_file import (
@@ -35,7 +40,6 @@ from vnreg_train.model_file import (
     read_model,
 )
 
-HUGE = 2**64 - 1
 PATTERNS = [1, 2, 4, 8, 16, 32, 64, 128, 0x55, 0xAA, 0x7F, 0xFF]
 
 
@@ -47,19 +51,6 @@ def refusal(content: bytes, field: str) -> ModelFileError:
     assert field in error.field
     assert error.expected and error.got and error.expected != error.got
     return error
-
-
-def one_tensor(shape: tuple[int, ...], dtype: int = F32, data: bytes = bytes(64)) -> bytes:
-    return Draft(table=table_entry(b"w", dtype, shape, 0), tensor_count=1, data=data).build()
-
-
-def two_tensors(first: bytes, second: bytes, offsets: tuple[int, int] = (0, 64)) -> bytes:
-    table = table_entry(first, F32, (3,), offsets[0]) + table_entry(second, F32, (3,), offsets[1])
-    return Draft(table=table, tensor_count=2, data=bytes(128)).build()
-
-
-def with_metadata(metadata: bytes) -> bytes:
-    return Draft(metadata=metadata).build()
 
 
 def test_the_undamaged_file_is_read() -> None:
@@ -299,18 +290,7 @@ def test_a_zero_extent_is_refused(shape: tuple[int, ...]) -> None:
 
 @pytest.mark.parametrize(
     "shape",
-    [
-        (2**62,),
-        (2**62 + 1,),
-        (2**32, 2**32),
-        (2**31, 2**31),
-        (2**16,) * 4,
-        (2, 2**63),
-        (HUGE, HUGE),
-        (HUGE,) * 4,
-        (2**28 + 1,),
-        (17,),
-    ],
+    WRAPPING_SHAPES,
 )
 @pytest.mark.parametrize("dtype", [F32, F64_TENSOR, I32])
 def test_a_shape_larger_than_the_data_is_refused(shape: tuple[int, ...], dtype: int) -> None:

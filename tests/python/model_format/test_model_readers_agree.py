@@ -16,16 +16,21 @@ import tiny_file
 from file_builder import (
     F32,
     F64_TENSOR,
+    HUGE,
     I32,
+    WRAPPING_SHAPES,
     Draft,
     bool_entry,
     counted,
     crc32c,
     entry,
+    one_tensor,
     small_draft,
     string_entry,
     table_entry,
+    two_tensors,
     u64_entry,
+    with_metadata,
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -40,7 +45,6 @@ from vnreg_train.model_file import (
     read_model,
 )
 
-HUGE = 2**64 - 1
 MODELS = Path(__file__).parents[3] / "models"
 Metadata = dict[str, MetadataValue]
 Tensors = dict[str, Any]
@@ -72,19 +76,6 @@ def check_refused_alike(content: bytes, about: str = "") -> None:
 
 
 # ---- the container ----
-
-
-def with_metadata(metadata: bytes) -> bytes:
-    return Draft(metadata=metadata).build()
-
-
-def one_tensor(shape: tuple[int, ...], dtype: int = F32, data: bytes = bytes(64)) -> bytes:
-    return Draft(table=table_entry(b"w", dtype, shape, 0), tensor_count=1, data=data).build()
-
-
-def two_tensors(first: bytes, second: bytes, offsets: tuple[int, int] = (0, 64)) -> bytes:
-    table = table_entry(first, F32, (3,), offsets[0]) + table_entry(second, F32, (3,), offsets[1])
-    return Draft(table=table, tensor_count=2, data=bytes(128)).build()
 
 
 def header_attacks() -> Iterator[tuple[str, bytes]]:
@@ -188,20 +179,6 @@ def table_attacks() -> Iterator[tuple[str, bytes]]:
     for dtype in (F32, F64_TENSOR, I32):
         for shape in WRAPPING_SHAPES:
             yield f"dtype {dtype}, shape {shape}", one_tensor(shape, dtype)
-
-
-WRAPPING_SHAPES: list[tuple[int, ...]] = [
-    (2**62,),
-    (2**62 + 1,),
-    (2**32, 2**32),
-    (2**31, 2**31),
-    (2**16,) * 4,
-    (2, 2**63),
-    (HUGE, HUGE),
-    (HUGE,) * 4,
-    (2**28 + 1,),
-    (17,),
-]
 
 
 def data_attacks() -> Iterator[tuple[str, bytes]]:
