@@ -117,7 +117,6 @@ void judge_all(const ScoredPose* poses, Index count, double* first, double* judg
   if (w.verified.judge.model == nullptr || count == 0) return;
   Index all[final_poses];
   std::iota(all, all + count, Index{0});
-  describe_judged_points(0, judged_points, w);
   look({all, static_cast<std::size_t>(count)}, judged_points, poses, first, w);
   std::copy_n(first, count, judged);
   if (!w.deadline.expired()) look_closer(poses, count, judged, w);
@@ -125,10 +124,16 @@ void judge_all(const ScoredPose* poses, Index count, double* first, double* judg
 
 }  // namespace
 
+void begin_judging(Workspace& w) noexcept {
+  const JudgeWorkspace& judge = w.verified.judge;
+  if (judge.scratch.empty() || (judge.model == nullptr && !w.recorder.enabled())) return;
+  choose_judged_points(w);
+  describe_judged_points(0, judged_points, w);
+}
+
 bool judge_poses(ScoredPose* poses, Index count, Workspace& w) noexcept {
   const JudgeWorkspace& judge = w.verified.judge;
   if (judge.scratch.empty() || judge.model == nullptr) return false;
-  choose_judged_points(w);
   double first[final_poses] = {}, judged[final_poses] = {};
   judge_all(poses, count, first, judged, w);
   if (w.deadline.expired()) return false;
@@ -138,7 +143,6 @@ bool judge_poses(ScoredPose* poses, Index count, Workspace& w) noexcept {
 
 void record_judgement(const ScoredPose* fits, Index count, Workspace& w) noexcept {
   if (w.verified.judge.scratch.empty() || !w.recorder.enabled()) return;
-  choose_judged_points(w);
   double first[final_poses] = {}, judged[final_poses] = {};
   judge_all(fits, count, first, judged, w);
   record(fits, first, judged, count, w);

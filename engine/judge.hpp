@@ -7,9 +7,12 @@
 
 namespace vnreg::detail {
 
+/// Finds what does not depend on the poses, from the pair's surfaces, descriptors and matches.
+/// First, once a pair.
+void begin_judging(Workspace& workspace) noexcept;
+
 /// Replaces the scores of `count` (at most final_poses) poses, in units of the surfaces, by the
-/// log-odds that they are right. Without a judge it does nothing, and returns false. Needs the
-/// pair's surfaces, descriptors and matches.
+/// log-odds that they are right. Without a judge it does nothing, and returns false.
 bool judge_poses(ScoredPose* poses, Index count, Workspace& workspace) noexcept;
 
 /// Where stages are recorded: what the judge is trained on, of poses with the scores of their fits.

@@ -272,6 +272,7 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
   }
   ScoredPose fits[final_poses];  // what is judged, with the score of the fit
   std::copy_n(poses, count, fits);
+  begin_judging(w);
   result.judged = judge_poses(poses, count, w);
   if (!w.deadline.expired() && doubtful(poses, count, result.judged)) {
     std::copy_n(fits, count, poses);
