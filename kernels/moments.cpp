@@ -4,94 +4,36 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "kernels/list_within.hpp"
+#include "kernels/power_sums.hpp"
 
 namespace vnreg::kernels {
 namespace {
 
-using Eigen::internal::padd;
-using Eigen::internal::ploadu;
 using Eigen::internal::pmadd;
-using Eigen::internal::pmin;
-using Eigen::internal::pmul;
 using Eigen::internal::predux;
-using Eigen::internal::pset1;
-using Eigen::internal::psub;
 
 using Matrix3f = Eigen::Matrix3f;
 
 constexpr float small = 1e-4f;  // keeps ratios of the moments of an isolated point finite
-static_assert(SpatialIndex::leaf_size % packet_size == 0);
 
-/// Weighted sums of the powers of the offsets, one lane per place in a packet
-/// of points.
-struct Sums {
-  Packet weight = zero(), x = zero(), y = zero(), z = zero();
-  Packet xx = zero(), xy = zero(), xz = zero(), yy = zero(), yz = zero(), zz = zero();
-  Packet cubic_x = zero(), cubic_y = zero(), cubic_z = zero();
-
-  static Packet zero() noexcept { return pset1<Packet>(0.0f); }
-};
-
-/// The points of the leaves that reach into the sphere about the centre.
-Sums sum_within(const SpatialIndex& index, const float* leaf_bounds, const float centre[3],
-                float radius_squared) noexcept {
-  const Packet cx = pset1<Packet>(centre[0]), cy = pset1<Packet>(centre[1]);
-  const Packet cz = pset1<Packet>(centre[2]);
-  const Packet limit = pset1<Packet>(radius_squared);
-  const Packet inverse = pset1<Packet>(1.0f / radius_squared);
-  const Coordinates points = index.ordered();
-  Sums s;
-  for_each_listed(leaf_bounds, index.leaves(), radius_squared, [&](Index leaf) {
-    const Index first = leaf * SpatialIndex::leaf_size;
-    for (Index i = first; i < first + SpatialIndex::leaf_size; i += packet_size) {
-      const Packet dx = psub(ploadu<Packet>(points.x + i), cx);
-      const Packet dy = psub(ploadu<Packet>(points.y + i), cy);
-      const Packet dz = psub(ploadu<Packet>(points.z + i), cz);
-      const Packet distance = pmadd(dz, dz, pmadd(dy, dy, pmul(dx, dx)));
-      // Cut at r, where the weight is exactly zero: the padding of the last
-      // leaf is at 1e30.
-      const Packet squared = pmin(distance, limit);
-      const Packet root = pmul(psub(limit, squared), inverse);
-      const Packet w = pmul(root, root);
-      const Packet wx = pmul(w, dx), wy = pmul(w, dy), wz = pmul(w, dz);
-      s.weight = padd(s.weight, w);
-      s.x = padd(s.x, wx);
-      s.y = padd(s.y, wy);
-      s.z = padd(s.z, wz);
-      s.xx = pmadd(wx, dx, s.xx);
-      s.xy = pmadd(wx, dy, s.xy);
-      s.xz = pmadd(wx, dz, s.xz);
-      s.yy = pmadd(wy, dy, s.yy);
-      s.yz = pmadd(wy, dz, s.yz);
-      s.zz = pmadd(wz, dz, s.zz);
-      s.cubic_x = pmadd(wx, squared, s.cubic_x);
-      s.cubic_y = pmadd(wy, squared, s.cubic_y);
-      s.cubic_z = pmadd(wz, squared, s.cubic_z);
-    }
-  });
-  return s;
-}
-
-Moments finish(const Sums& s, float radius) noexcept {
+Moments moments_within(const SpatialIndex& index, const float* leaf_bounds, const float centre[3],
+                       float radius) noexcept {
+  Packet cubic_x = PowerSums::zero(), cubic_y = cubic_x, cubic_z = cubic_x;
+  const auto add_cubic = [&](Packet wx, Packet wy, Packet wz, Packet squared) {
+    cubic_x = pmadd(wx, squared, cubic_x);
+    cubic_y = pmadd(wy, squared, cubic_y);
+    cubic_z = pmadd(wz, squared, cubic_z);
+  };
+  const PowerSums s = sum_within(index, leaf_bounds, centre, radius * radius, add_cubic);
   const float share = 1.0f / predux(s.weight);
   const float per_radius = share / radius;
   Moments m;
-  m.offset[0] = per_radius * predux(s.x);
-  m.offset[1] = per_radius * predux(s.y);
-  m.offset[2] = per_radius * predux(s.z);
-  const float second[6] = {predux(s.xx), predux(s.xy), predux(s.xz),
-                           predux(s.yy), predux(s.yz), predux(s.zz)};
-  constexpr Index row[6] = {0, 0, 0, 1, 1, 2};
-  constexpr Index column[6] = {0, 1, 2, 1, 2, 2};
-  for (Index i = 0; i < 6; ++i) {
-    m.covariance[i] =
-        4.0f * (per_radius / radius * second[i] - m.offset[row[i]] * m.offset[column[i]]);
-  }
+  s.offset(per_radius, m.offset);
+  s.covariance(per_radius / radius, m.offset, m.covariance);
   const float per_cube = per_radius / (radius * radius);
-  m.skew[0] = per_cube * predux(s.cubic_x);
-  m.skew[1] = per_cube * predux(s.cubic_y);
-  m.skew[2] = per_cube * predux(s.cubic_z);
+  m.skew[0] = per_cube * predux(cubic_x);
+  m.skew[1] = per_cube * predux(cubic_y);
+  m.skew[2] = per_cube * predux(cubic_z);
   return m;
 }
 
@@ -162,7 +104,7 @@ void radius_moments(const SpatialIndex& index, const float centre[3],
                     Moments out[moment_radii]) noexcept {
   index.leaf_bounds(centre[0], centre[1], centre[2], leaf_bounds);
   for (Index i = 0; i < moment_radii; ++i) {
-    out[i] = finish(sum_within(index, leaf_bounds, centre, radii[i] * radii[i]), radii[i]);
+    out[i] = moments_within(index, leaf_bounds, centre, radii[i]);
   }
 }
 
