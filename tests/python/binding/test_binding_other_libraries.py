@@ -13,7 +13,7 @@ import trimesh
 import vnreg
 from vnreg._clouds import SURFACE_POINTS, points_of, surface_points
 
-o3d = pytest.importorskip("open3d")
+o3d = pytest.importorskip("open3d", reason="only `make evaluate` installs the peers")
 
 
 @pytest.fixture(scope="module")

@@ -40,7 +40,7 @@ def test_a_file_of_another_library(vnreg: Program, model: Path, name: str, tmp_p
 @pytest.fixture(scope="module")
 def open3d() -> Any:
     """Of requirements/evaluate.txt: too large for every installation."""
-    return pytest.importorskip("open3d")
+    return pytest.importorskip("open3d", reason="only `make evaluate` installs the peers")
 
 
 @pytest.mark.parametrize(("name", "file_name", "options"), list(open3d_writers()))
