@@ -51,10 +51,13 @@ class Twin:
     name: str
     network: RegistrationNetwork
     path: Path
+    max_points: int = 16384  # the memory that a registrar takes grows with its square
 
     def __post_init__(self) -> None:
         model = vnreg.Model.load(self.path)
-        self._recorder = vnreg.Registrar(model, mode="paper", max_points=16384, record_stages=True)
+        self._recorder = vnreg.Registrar(
+            model, mode="paper", max_points=self.max_points, record_stages=True
+        )
         self._reference = Reference(copy.deepcopy(self.network))
         self._exact = Reference(copy.deepcopy(self.network), torch.float64)
 

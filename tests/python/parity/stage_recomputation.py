@@ -75,7 +75,7 @@ class StageRecomputation:
         v = self._vectors(f"{side}.network2.block1")
         products = v.transpose(-1, -2) @ self._vectors(f"{side}.frame")
         z = local.descriptor(products.flatten(-2))
-        score, kept = self.network.fine.keep(self._tensor(f"{side}.descriptor"))
+        score, _ = self.network.fine.keep(self._tensor(f"{side}.descriptor"))
         block0 = local.network2[0](torch.cat([latent, expanded], dim=-1))
         block1 = local.network2[1](with_pooled(self._vectors(f"{side}.network2.block0")))
         return {
@@ -84,7 +84,8 @@ class StageRecomputation:
             "frame": local.frame(v).transpose(-1, -2),
             "descriptor": torch.relu(local.norm(z.transpose(1, 2)).transpose(1, 2)),
             "significance": score,
-            "kept": kept,
+            # Of the engine's significances: nearly equal ones of torch may come in another order.
+            "kept": self.network.fine.most_significant(self._tensor(f"{side}.significance")),
         }
 
     def _kept(self, side: str, name: str) -> Tensor:

@@ -130,8 +130,13 @@ class FineRegister(nn.Module):
     def keep(self, descriptors: Tensor) -> tuple[Tensor, Tensor]:
         """Significances (B, N); indices (B, N // keep_divisor) of the largest, descending."""
         score = self.significance(descriptors).squeeze(-1)
+        return score, self.most_significant(score)
+
+    def most_significant(self, score: Tensor) -> Tensor:
+        """Significances (B, N) -> indices (B, N // keep_divisor) of the largest, descending, equal
+        ones by index."""
         order = torch.sort(score, dim=-1, descending=True, stable=True).indices
-        return score, order[:, : score.shape[1] // self.keep_divisor]
+        return order[:, : score.shape[1] // self.keep_divisor]
 
 
 def gather_points(values: Tensor, index: Tensor) -> Tensor:
