@@ -25,16 +25,16 @@ def _with_steps(config: TrainingConfig, stage: str, steps: int | None) -> Traini
 
     if steps is None:
         return config
-    if stage == "coarse":
-        return replace(config, coarse=replace(config.coarse, steps=steps))
-    return replace(config, fine=replace(config.fine, steps=steps))
+    return replace(config, **{stage: replace(getattr(config, stage), steps=steps)})
 
 
 def train(arguments: argparse.Namespace) -> None:
     if config_arch(arguments.config) == "vnreg":
         train_descriptor(arguments)
     elif arguments.stage is None:
-        raise SystemExit("vnreg-train train: the paper's network needs --stage coarse or fine")
+        raise SystemExit(
+            "vnreg-train train: the paper's network needs --stage coarse, fine or joint"
+        )
     else:
         train_stage(arguments)
 
@@ -68,7 +68,8 @@ def train_stage(arguments: argparse.Namespace) -> None:
         config = replace(config, threads=arguments.threads)
     shapes = load_shapes(Path(arguments.data or config.data.folder), "train")
     run = Path(arguments.run or Path("runs") / config.name)
-    trainer = StageTrainer(config, arguments.stage, shapes, run)
+    initial = Path(arguments.initial) if arguments.initial else None
+    trainer = StageTrainer(config, arguments.stage, shapes, run, initial)
     trainer.run(max_minutes=arguments.minutes, progress=not arguments.quiet)
 
 
@@ -137,8 +138,9 @@ def parser() -> argparse.ArgumentParser:
 
     fit = commands.add_parser("train", help="train a network (or one stage); resumes")
     fit.add_argument("config", help="a TOML file, or the name of a shipped one: vnreg, small")
-    fit.add_argument("--stage", choices=("coarse", "fine"), help="paper's network only")
+    fit.add_argument("--stage", choices=("coarse", "fine", "joint"), help="paper's network only")
     fit.add_argument("--run", help="folder of checkpoints and curves (default runs/NAME)")
+    fit.add_argument("--initial", help="a checkpoint whose weights a new run starts from")
     fit.add_argument("--data", help="folder of the shapes (default: as configured)")
     fit.add_argument("--steps", type=int, help="length of the schedule, instead of the configured")
     fit.add_argument("--threads", type=int, help="torch threads, instead of the configured")

@@ -10,6 +10,7 @@ from vnreg_train.networks.fine import (
     FineRegister,
     fine_loss,
     negative_entropy,
+    significant_candidates,
     training_candidates,
 )
 
@@ -93,6 +94,34 @@ def test_half_of_the_candidates_have_a_true_match() -> None:
         - torch.gather(target, 1, nearest.unsqueeze(-1).expand(-1, -1, 3))
     ).norm(dim=-1)
     assert bool((distance[:, :20] < 0.05).all()) and bool((distance[:, 20:] >= 0.05).all())
+
+
+def test_the_truth_of_kept_points_is_the_nearest_kept_one_if_near() -> None:
+    source = torch.tensor([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]])
+    target = torch.tensor([[[3.01, 0, 0], [2.04, 0, 0], [1.0, 0, 0], [1.96, 0, 0]]])
+    kept_source, kept_target = torch.tensor([[3, 2, 1]]), torch.tensor([[1, 0]])
+    truth, has_match = significant_candidates(source, target, kept_source, kept_target)
+    assert truth.tolist() == [[1, 0, -1]]
+    assert has_match.tolist() == [[1.0, 1.0, 0.0]]
+
+
+def test_points_without_a_match_do_not_count_as_matched() -> None:
+    """A truth of -1 takes no part in the matching loss, and its weight must learn to vanish."""
+    torch.manual_seed(5)
+    fine = FineRegister(CONFIG).eval()
+    x, features = torch.randn(1, 9, 3), torch.randn(1, 9, 8)
+    with torch.no_grad():
+        steps = fine.run(x, x, features, features)
+    score, truth = torch.zeros(1, 9), torch.arange(9).unsqueeze(0)
+    lonely = torch.where(truth == 4, -1, truth)
+    is_match = (lonely >= 0).float()
+    for step in steps:
+        step.similarity = 40 * torch.eye(9).unsqueeze(0) - 20
+        step.match = truth
+        step.weight_logit = torch.full((1, 9), 20.0)
+    terms = fine_loss(steps, score, score, is_match, lonely)
+    assert float(terms["match"]) < 1e-6
+    assert abs(float(terms["weight"]) - len(steps) * 20.0 / 9) < 1e-3
 
 
 def test_losses_vanish_for_a_perfect_matcher() -> None:

@@ -20,7 +20,7 @@ def test_registration_loss_is_the_chord_of_the_angle() -> None:
     """|R - I|_F² = 8 sin²(angle / 2)."""
     rotation = torch.from_numpy(Rotation.from_rotvec([0.0, 0.0, 0.6]).as_matrix())[None]
     shift = torch.tensor([[0.1, 0.0, 0.2]], dtype=torch.float64)
-    loss = registration_loss(rotation, shift, torch.zeros(1, 3, dtype=torch.float64))
+    loss = registration_loss(rotation, shift)
     assert math.isclose(float(loss), 8 * math.sin(0.3) ** 2 + 0.05, rel_tol=1e-12)
 
 

@@ -15,21 +15,27 @@ sys.path.insert(0, str(Path(__file__).parent))
 from tiny_run import STEPS, bent_boxes, tiny_config, train_steps, trainer
 
 from vnreg_train.data.shapes import ShapeSet
-from vnreg_train.training.config import load_config
+from vnreg_train.training.config import TrainingConfig, load_config
 from vnreg_train.training.train import StageTrainer
+
+
+def stages_before(folder: Path, stage: str, config: TrainingConfig | None = None) -> None:
+    """Two steps of each stage that `stage` starts from."""
+    before = {"coarse": [], "fine": ["coarse"], "joint": ["coarse", "fine"]}[stage]
+    for name in before:
+        run = trainer(folder, name, config)
+        train_steps(run, 2)
+        run.save()
 
 
 def parameters(run: StageTrainer) -> torch.Tensor:
     return torch.cat([p.detach().flatten() for p in run.network.parameters()])
 
 
-@pytest.mark.parametrize("stage", ["coarse", "fine"])
+@pytest.mark.parametrize("stage", ["coarse", "fine", "joint"])
 def test_a_resumed_run_equals_an_unbroken_one_to_the_bit(tmp_path: Path, stage: str) -> None:
-    if stage == "fine":
-        for folder in ("whole", "broken"):
-            coarse = trainer(tmp_path / folder, "coarse")
-            train_steps(coarse, 2)
-            coarse.save()
+    for folder in ("whole", "broken"):
+        stages_before(tmp_path / folder, stage)
     whole = trainer(tmp_path / "whole", stage)
     figures = train_steps(whole, STEPS)
     first = trainer(tmp_path / "broken", stage)
@@ -60,9 +66,7 @@ def test_the_loop_stops_saves_and_goes_on(tmp_path: Path) -> None:
 
 
 def test_the_second_stage_leaves_the_global_module_alone(tmp_path: Path) -> None:
-    coarse = trainer(tmp_path, "coarse")
-    train_steps(coarse, 2)
-    coarse.save()
+    stages_before(tmp_path, "fine")
     fine = trainer(tmp_path, "fine")
     frozen = {k: v.clone() for k, v in fine.network.extractor.global_module.state_dict().items()}
     local = fine.network.extractor.local_module.descriptor.weight.detach().clone()
@@ -70,6 +74,28 @@ def test_the_second_stage_leaves_the_global_module_alone(tmp_path: Path) -> None
     for name, value in fine.network.extractor.global_module.state_dict().items():
         assert torch.equal(value, frozen[name]), name
     assert not torch.equal(local, fine.network.extractor.local_module.descriptor.weight)
+
+
+def test_the_joint_stage_trains_every_part(tmp_path: Path) -> None:
+    """Also with candidates as at test time, whose gradient reaches the significances."""
+    config = tiny_config()
+    config = replace(config, joint=replace(config.joint, tested_share=1.0))
+    stages_before(tmp_path, "joint", config)
+    joint = trainer(tmp_path, "joint", config)
+    before = {k: v.detach().clone() for k, v in joint.network.named_parameters()}
+    assert all(math.isfinite(f["loss"]) for f in train_steps(joint, 3))
+    for name, value in joint.network.named_parameters():
+        assert not torch.equal(value, before[name]), name
+
+
+def test_a_run_starts_from_the_weights_of_another(tmp_path: Path) -> None:
+    stages_before(tmp_path / "first", "fine")
+    start = tmp_path / "first" / "coarse.pt"
+    second = StageTrainer(tiny_config(), "coarse", bent_boxes(8), tmp_path / "second", start)
+    weights = torch.load(start, weights_only=True)["ema"]
+    for name, value in second.network.state_dict().items():
+        assert torch.equal(value, weights[name]), name
+    assert second.step == 0
 
 
 def test_the_second_stage_needs_the_first(tmp_path: Path) -> None:

@@ -54,6 +54,7 @@ def tiny_config() -> TrainingConfig:
         data=DataConfig(points=96, queries=32, settings={"half": 1.0, "partial": 1.0}),
         coarse=replace(stage, scaled_start=True),
         fine=stage,
+        joint=stage,
     )
 
 

@@ -26,6 +26,11 @@ class NetworkConfig:
     invariant_layer: bool = True
     shared_encoder: bool = True
 
+    @property
+    def equivariant(self) -> bool:
+        """Whether global features turn with the cloud and descriptors do not change."""
+        return self.vector_neurons and self.invariant_layer
+
     @staticmethod
     def from_dict(values: dict[str, Any]) -> NetworkConfig:
         """Builds a configuration from a TOML table; unknown keys are an error."""

@@ -160,22 +160,44 @@ def training_candidates(
     return index, torch.gather(nearest, 1, index), torch.gather(is_match, 1, index)
 
 
-def fine_loss(
-    steps: list[FineStep], source_score: Tensor, target_score: Tensor, is_match: Tensor
-) -> dict[str, Tensor]:
-    """The three losses of IDAM, summed over iterations. Pair (i, i) is the true match of i.
+def significant_candidates(
+    source: Tensor, target: Tensor, index_x: Tensor, index_y: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Which of the points that elimination kept, as at test time, match: the truth of each.
 
-    source_score, target_score: significances of the candidates (B, K); is_match: (B, K).
+    source (B, N, 3) at the true pose, target (B, M, 3); indices (B, K) of the kept points. Returns
+    the position (B, K) of the nearest kept target point, -1 where that is 0.05 away or more, and
+    whether there is one.
+    """
+    kept = gather_points(source, index_x), gather_points(target, index_y)
+    distance, nearest = torch.cdist(*kept).min(2)
+    near = distance < MATCH_RADIUS
+    return torch.where(near, nearest, -1), near.float()
+
+
+def fine_loss(
+    steps: list[FineStep],
+    source_score: Tensor,
+    target_score: Tensor,
+    is_match: Tensor,
+    truth: Tensor | None = None,
+) -> dict[str, Tensor]:
+    """The three losses of IDAM, summed over iterations.
+
+    source_score, target_score: significances of the candidates (B, K); is_match: (B, K), whether
+    there is a true match; truth: (B, K) its position, -1 for none, or None where i matches i.
     """
     first = steps[0].similarity.detach()
     entropy = functional.mse_loss(source_score, negative_entropy(first, -1)) + functional.mse_loss(
         target_score, negative_entropy(first, -2)
     )
-    truth = torch.arange(first.shape[1], device=first.device)
+    if truth is None:
+        truth = torch.arange(first.shape[1], device=first.device).expand(is_match.shape)
     match = torch.zeros((), device=first.device)
     weight = torch.zeros((), device=first.device)
     for step in steps:
-        log_probability = torch.log_softmax(step.similarity, -1).diagonal(dim1=1, dim2=2)
+        log_probability = torch.log_softmax(step.similarity, -1)
+        log_probability = log_probability.gather(2, truth.clamp(min=0).unsqueeze(2)).squeeze(2)
         match = match - (log_probability * is_match).sum() / is_match.sum().clamp(min=1.0)
         label = (step.match == truth).float()
         weight = weight + functional.binary_cross_entropy_with_logits(step.weight_logit, label)

@@ -48,6 +48,8 @@ class StageConfig:
     consistency_weight: float = 0.0  # ours: whitened distance of the paired global features
     scaled_start: bool = False  # ours: initial weights scaled on data; equivariant networks only
     gradient_limit: float = 0.0  # ours: largest gradient of one pair's Procrustes; 0 = none
+    tested_share: float = 0.0  # ours: share of the pairs matched between points kept as at test
+    matching_weight: float = 1.0  # of the fine register's losses
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,10 @@ class TrainingConfig:
     data: DataConfig = field(default_factory=DataConfig)
     coarse: StageConfig = field(default_factory=StageConfig)
     fine: StageConfig = field(default_factory=StageConfig)
+    joint: StageConfig = field(default_factory=StageConfig)  # ours: everything at once, at last
 
+
+SECTIONS = {"data": DataConfig, "coarse": StageConfig, "fine": StageConfig, "joint": StageConfig}
 
 T = TypeVar("T")
 
@@ -81,7 +86,7 @@ def parse_config(text: str) -> TrainingConfig:
     """Reads TOML text; every unknown section or key is an error that names the known ones."""
     values = tomllib.loads(text)
     values["network"] = NetworkConfig.from_dict(values.get("network", {}))
-    for name, kind in (("data", DataConfig), ("coarse", StageConfig), ("fine", StageConfig)):
+    for name, kind in SECTIONS.items():
         values[name] = checked_section(kind, name, values.get(name, {}))
     return checked_section(TrainingConfig, "top level", values)
 

@@ -11,11 +11,11 @@ from torch import Tensor
 PAPER_QUERIES = 2048
 
 
-def registration_loss(rotation: Tensor, translation: Tensor, truth: Tensor) -> Tensor:
-    """|R_gt^T R - I|_F² + |t - t_gt|² (eq. 8) with R_gt = I, mean over the batch."""
+def registration_loss(rotation: Tensor, translation: Tensor) -> Tensor:
+    """|R_gt^T R - I|_F² + |t - t_gt|² (eq. 8) of residuals R_gt^T R, t - t_gt; batch's mean."""
     identity = torch.eye(3, dtype=rotation.dtype, device=rotation.device)
     angular = (rotation - identity).square().sum((1, 2))
-    return (angular + (translation - truth).square().sum(1)).mean()
+    return (angular + translation.square().sum(1)).mean()
 
 
 def occupancy_loss(logits: Tensor, occupancies: Tensor) -> Tensor:

@@ -24,9 +24,11 @@ from vnreg_train.training.checkpoint import (
 )
 from vnreg_train.training.config import StageConfig, TrainingConfig
 from vnreg_train.training.initial import scale_initial_weights
-from vnreg_train.training.stages import CoarseStage, FineStage
+from vnreg_train.training.stages import CoarseStage, FineStage, JointStage
 
-STAGES = ("coarse", "fine")
+Stage = CoarseStage | FineStage | JointStage
+STAGES: dict[str, type[Stage]] = {"coarse": CoarseStage, "fine": FineStage, "joint": JointStage}
+BEFORE = {"fine": "coarse", "joint": "fine"}  # whose average a stage starts from
 LOG_EVERY = 50  # steps
 
 
@@ -34,17 +36,22 @@ class StageTrainer:
     """One stage: network, average, optimiser and schedule, new or from a checkpoint."""
 
     def __init__(
-        self, config: TrainingConfig, stage: str, shapes: ShapeSet, run_folder: Path
+        self,
+        config: TrainingConfig,
+        stage: str,
+        shapes: ShapeSet,
+        run_folder: Path,
+        initial: Path | None = None,
     ) -> None:
+        """`initial`: a checkpoint whose averaged weights a new run starts from."""
         if stage not in STAGES:
-            raise ValueError(f"stage: expected one of {STAGES}, got {stage!r}")
+            raise ValueError(f"stage: expected one of {tuple(STAGES)}, got {stage!r}")
         torch.set_num_threads(config.threads)
         torch.manual_seed(config.seed)
         self.config, self.stage, self.run_folder = config, stage, run_folder
         self.settings: StageConfig = getattr(config, stage)
         self.network = RegistrationNetwork(config.network)
-        kind = CoarseStage if stage == "coarse" else FineStage
-        self.module = kind(self.network, self.settings, config.compile)
+        self.module: Stage = STAGES[stage](self.network, self.settings, config.compile)
         self.average = AveragedModel(
             self.network,
             multi_avg_fn=get_ema_multi_avg_fn(self.settings.ema_decay),
@@ -68,37 +75,37 @@ class StageTrainer:
                 points=config.data.points,
                 batch=self.settings.batch,
                 settings_mix=config.data.settings,
-                seed=config.seed + STAGES.index(stage),
+                seed=config.seed + list(STAGES).index(stage),
                 queries=config.data.queries,
                 augment=config.data.anisotropic,
             ),
             neighbours=config.data.neighbours or config.network.neighbours,
             rms_radius=config.network.input_rms_radius,
-            turn=stage == "fine",
+            turn=stage != "coarse",
             steps=self.settings.steps,
+            apart=not config.network.equivariant,
         )
         self.step = 0
         self.skipped = 0
-        self._start()
+        self._start(initial)
 
     @property
     def checkpoint(self) -> Path:
         return self.run_folder / f"{self.stage}.pt"
 
-    def _start(self) -> None:
-        """Resumes this stage, or starts the fine stage from the coarse stage's average."""
+    def _start(self, initial: Path | None) -> None:
+        """Resumes this stage, or starts from `initial`, or the fine one from the coarse one."""
         if self.checkpoint.exists():
             state = torch.load(self.checkpoint, weights_only=True)
             self.step = restore_training_state(
                 state, self.network, self.average, self.optimizer, self.schedule
             )
-        elif self.stage == "fine":
-            coarse = self.run_folder / "coarse.pt"
-            if not coarse.exists():
-                raise FileNotFoundError(f"{coarse}: train the coarse stage first")
-            weights = torch.load(coarse, weights_only=True)["ema"]
-            self.network.load_state_dict(weights)
-            self.average.module.load_state_dict(weights)
+        elif initial is not None or self.stage in BEFORE:
+            weights = initial or self.run_folder / f"{BEFORE[self.stage]}.pt"
+            if not weights.exists():
+                raise FileNotFoundError(f"{weights}: train stage {weights.stem} first")
+            self.network.load_state_dict(torch.load(weights, weights_only=True)["ema"])
+            self.average.module.load_state_dict(self.network.state_dict())
         elif self.settings.scaled_start:
             scale_initial_weights(self.network.extractor, self.batches[0].edges)
             self.average.module.load_state_dict(self.network.state_dict())
