@@ -111,6 +111,20 @@ def export(arguments: argparse.Namespace) -> None:
     )
 
 
+def import_authors_checkpoint(arguments: argparse.Namespace) -> None:
+    from vnreg_train.export.import_authors import AuthorsCheckpointError, import_authors
+    from vnreg_train.export.model import export_model
+
+    try:
+        imported = import_authors(Path(arguments.checkpoint))
+    except (AuthorsCheckpointError, OSError) as error:
+        raise SystemExit(f"vnreg-train import-authors: {error}") from error
+    source = {"provenance.source": "a checkpoint of github.com/linchengweiii/CFReg"}
+    export_model(imported.network, Path(arguments.out), arguments.name, extra=dict(source))
+    if not imported.has_fine:
+        print("the checkpoint holds the coarse stage alone: the model has mode coarse only")
+
+
 def golden(arguments: argparse.Namespace) -> None:
     from vnreg_train.data.protocol import make_pair
     from vnreg_train.data.shapes import load_shapes
@@ -166,6 +180,14 @@ def parser() -> argparse.ArgumentParser:
     out.add_argument("--points", type=int, default=1024, help="default subsampling of the engine")
     out.add_argument("--provenance", nargs="*", default=[], metavar="KEY=TEXT")
     out.set_defaults(run_command=export)
+
+    authors = commands.add_parser(
+        "import-authors", help="write a checkpoint of the paper's authors as a .vnr file"
+    )
+    authors.add_argument("checkpoint", help="a .pth file that their train.py saved")
+    authors.add_argument("--out", required=True, help="the .vnr file")
+    authors.add_argument("--name", default="authors", help="the model's name")
+    authors.set_defaults(run_command=import_authors_checkpoint)
 
     gold = commands.add_parser("golden", help="write every activation of one pair, for selftest")
     gold.add_argument("checkpoint")
