@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from vnreg_train.training.config import TrainingConfig, config_arch, load_config
+from vnreg_train.training.config import RunConfig, TrainingConfig, config_arch, load_config
+
+if TYPE_CHECKING:
+    from vnreg_train.data.shapes import ShapeSet
 
 
 def build_data(arguments: argparse.Namespace) -> None:
@@ -53,7 +57,8 @@ def train_descriptor(arguments: argparse.Namespace) -> None:
         config = replace(config, threads=arguments.threads)
     shapes = load_shapes(Path(arguments.data or config.data.folder), "train", queries=0)
     run = Path(arguments.run or Path("runs") / config.name)
-    trainer = DescriptorTrainer(config, shapes, run)
+    validation = validation_shapes(arguments, config, config.data.folder)
+    trainer = DescriptorTrainer(config, shapes, run, validation)
     trainer.run(max_minutes=arguments.minutes, progress=not arguments.quiet)
 
 
@@ -69,8 +74,26 @@ def train_stage(arguments: argparse.Namespace) -> None:
     shapes = load_shapes(Path(arguments.data or config.data.folder), "train")
     run = Path(arguments.run or Path("runs") / config.name)
     initial = Path(arguments.initial) if arguments.initial else None
-    trainer = StageTrainer(config, arguments.stage, shapes, run, initial)
+    validation = validation_shapes(arguments, config, config.data.folder)
+    trainer = StageTrainer(config, arguments.stage, shapes, run, initial, validation)
     trainer.run(max_minutes=arguments.minutes, progress=not arguments.quiet)
+
+
+def validation_shapes(
+    arguments: argparse.Namespace, config: RunConfig, folder: str
+) -> ShapeSet | None:
+    """Those to validate on; None where the configuration wants none, or the data have none."""
+    from vnreg_train.data.shapes import ShapesError, load_shapes
+    from vnreg_train.evaluate.pairs import shape_indices
+
+    if config.validation_steps == 0:
+        return None
+    try:
+        shapes = load_shapes(Path(arguments.data or folder), "validation", queries=0)
+    except ShapesError as error:
+        print(f"training without validation: {error}")
+        return None
+    return shapes.subset(shape_indices(len(shapes), config.validation_shapes))
 
 
 def train_judge(arguments: argparse.Namespace) -> None:

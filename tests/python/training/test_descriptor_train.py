@@ -19,10 +19,11 @@ from vnreg_train.data.mixture import RECIPES, MixtureSampler
 from vnreg_train.networks.descriptor import unit_frames
 from vnreg_train.networks.descriptor_config import DescriptorConfig
 from vnreg_train.training.config import config_arch
+from vnreg_train.training.descriptor_batches import network_batch
 from vnreg_train.training.descriptor_config import (
+    DescriptorOptimisationConfig,
     DescriptorTrainingConfig,
     MixtureConfig,
-    OptimisationConfig,
     load_descriptor_config,
     parse_descriptor_config,
 )
@@ -33,7 +34,7 @@ from vnreg_train.training.descriptor_losses import (
     matching_loss,
     soft_targets,
 )
-from vnreg_train.training.descriptor_train import DescriptorTrainer, network_batch
+from vnreg_train.training.descriptor_train import DescriptorTrainer
 from vnreg_train.training.descriptor_validation import validate
 
 STEPS = 8
@@ -46,7 +47,7 @@ def tiny_config() -> DescriptorTrainingConfig:
         compile=False,
         network=DescriptorConfig(channels=8, scalars=8, gates=2, products=2, global_channels=8),
         data=MixtureConfig(points=48, encoded=24, mixture={"clean": 1.0, "partial_75_noisy": 1.0}),
-        optimisation=OptimisationConfig(
+        optimisation=DescriptorOptimisationConfig(
             steps=STEPS, batch=4, learning_rate=1e-2, bfloat16=False, weights=WEIGHTS
         ),
     )
@@ -82,7 +83,7 @@ def test_the_loop_stops_saves_and_goes_on(tmp_path: Path) -> None:
     again = trainer(tmp_path)
     again.run(progress=False)
     assert again.step == STEPS
-    assert list((tmp_path / "tensorboard").glob("events*"))
+    assert list((tmp_path / "tensorboard" / "vnreg").glob("events*"))
 
 
 def test_training_reduces_the_loss(tmp_path: Path) -> None:

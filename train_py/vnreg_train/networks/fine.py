@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -11,6 +12,7 @@ from torch import Tensor, nn
 from vnreg_train.networks.coarse import procrustes
 from vnreg_train.networks.config import NetworkConfig
 
+Compare = Callable[[Tensor, Tensor, Tensor, Tensor], tuple[Tensor, Tensor]]
 MATCH_RADIUS = 0.05  # a true match is closer than this after the true pose
 
 
@@ -95,10 +97,15 @@ class FineRegister(nn.Module):
         return similarity, features.amax(2)
 
     def step(
-        self, x: Tensor, y: Tensor, part_x: Tensor, part_y: Tensor
+        self,
+        x: Tensor,
+        y: Tensor,
+        part_x: Tensor,
+        part_y: Tensor,
+        compare: Compare | None = None,
     ) -> tuple[FineStep, Tensor, Tensor]:
         """One iteration; returns it (with this step's own pose) and the pose as (R, t)."""
-        similarity, row_maxima = self.compare(x, y, part_x, part_y)
+        similarity, row_maxima = (compare or self.compare)(x, y, part_x, part_y)
         weight_logit = self.weight(row_maxima).squeeze(-1)
         match = similarity.argmax(-1)
         weight = torch.sigmoid(weight_logit)
@@ -110,15 +117,23 @@ class FineRegister(nn.Module):
         step = FineStep(similarity, match, weight_logit, weight, rotation, translation)
         return step, rotation, translation
 
-    def run(self, x: Tensor, y: Tensor, features_x: Tensor, features_y: Tensor) -> list[FineStep]:
+    def run(
+        self,
+        x: Tensor,
+        y: Tensor,
+        features_x: Tensor,
+        features_y: Tensor,
+        compare: Compare | None = None,
+    ) -> list[FineStep]:
         """All iterations on kept points (B, K, 3) and their descriptors (B, K, D).
 
         The source has been moved by the coarse pose; poses accumulate over the iterations.
+        compare: what takes the place of `self.compare`, compiled or in another precision.
         """
         part_x, part_y = self.feature_parts(features_x, features_y)
         steps: list[FineStep] = []
         for _ in range(self.iterations):
-            step, rotation, translation = self.step(x, y, part_x, part_y)
+            step, rotation, translation = self.step(x, y, part_x, part_y, compare)
             x = x @ rotation.transpose(1, 2) + translation.unsqueeze(1)
             if steps:
                 step.rotation = rotation @ steps[-1].rotation

@@ -32,17 +32,28 @@ class DataConfig:
 
 
 @dataclass(frozen=True)
-class StageConfig:
-    """One stage's optimisation: AdamW on a one-cycle schedule with clipped gradients and EMA."""
+class OptimisationConfig:
+    """AdamW on a one-cycle schedule with clipped gradients and an average of the weights."""
+
+    steps: int = 10_000
+    batch: int = 16
+    learning_rate: float = 2e-3
+    weight_decay: float = 1e-4
+    warmup: float = 0.05  # share of the steps in which the rate rises
+    clip_norm: float = 1.0
+    ema_decay: float = 0.999
+    bfloat16: bool = True  # autocast of the networks; poses stay in float64
+
+
+@dataclass(frozen=True)
+class StageConfig(OptimisationConfig):
+    """One stage of the paper's network; the defaults are the paper's."""
 
     steps: int = 300_000
     batch: int = 32
     learning_rate: float = 1e-4
     weight_decay: float = 1e-3
-    warmup: float = 0.05  # share of the steps in which the rate rises
-    clip_norm: float = 1.0
-    ema_decay: float = 0.999
-    bfloat16: bool = False  # autocast of encoder, local module and decoder; poses stay in float64
+    bfloat16: bool = False
     registration_weight: float = 10.0
     occupancy_weight: float = 0.1  # of the sum over 2,048 queries
     consistency_weight: float = 0.0  # ours: whitened distance of the paired global features
@@ -53,14 +64,23 @@ class StageConfig:
 
 
 @dataclass(frozen=True)
-class TrainingConfig:
-    """The whole file."""
+class RunConfig:
+    """What every run has: its name, its machine, when it saves, logs and validates."""
 
     name: str = "unnamed"
     seed: int = 0
     threads: int = 2
     compile: bool = True
     checkpoint_minutes: float = 5.0
+    log_steps: int = 20  # between two points of a curve
+    validation_steps: int = 500  # between two validations; 0 = none
+    validation_shapes: int = 32  # spread over the validation split
+
+
+@dataclass(frozen=True)
+class TrainingConfig(RunConfig):
+    """The whole file."""
+
     network: NetworkConfig = field(default_factory=NetworkConfig)
     data: DataConfig = field(default_factory=DataConfig)
     coarse: StageConfig = field(default_factory=StageConfig)

@@ -7,7 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from vnreg_train.networks.descriptor_config import DescriptorConfig
-from vnreg_train.training.config import checked_section, find_config
+from vnreg_train.training.config import (
+    OptimisationConfig,
+    RunConfig,
+    checked_section,
+    find_config,
+)
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -28,33 +33,23 @@ class MixtureConfig:
 
 
 @dataclass(frozen=True)
-class OptimisationConfig:
-    """AdamW on a one-cycle schedule with clipped gradients and an average of the weights."""
+class DescriptorOptimisationConfig(OptimisationConfig):
+    """And the weight of each loss (descriptor_losses)."""
 
-    steps: int = 10_000
-    batch: int = 16
-    learning_rate: float = 2e-3
-    weight_decay: float = 1e-4
-    warmup: float = 0.05
-    clip_norm: float = 1.0
-    ema_decay: float = 0.999
-    bfloat16: bool = True
     weights: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class DescriptorTrainingConfig:
+class DescriptorTrainingConfig(RunConfig):
     """The whole file."""
 
     arch: str = "vnreg"
     name: str = "vnreg"
-    seed: int = 0
     threads: int = 1
-    compile: bool = True
     checkpoint_minutes: float = 2.0
     network: DescriptorConfig = field(default_factory=DescriptorConfig)
     data: MixtureConfig = field(default_factory=MixtureConfig)
-    optimisation: OptimisationConfig = field(default_factory=OptimisationConfig)
+    optimisation: DescriptorOptimisationConfig = field(default_factory=DescriptorOptimisationConfig)
 
 
 def parse_descriptor_config(text: str) -> DescriptorTrainingConfig:
@@ -65,7 +60,7 @@ def parse_descriptor_config(text: str) -> DescriptorTrainingConfig:
     values["network"] = DescriptorConfig.from_dict(values.get("network", {}))
     values["data"] = checked_section(MixtureConfig, "data", values.get("data", {}))
     values["optimisation"] = checked_section(
-        OptimisationConfig, "optimisation", values.get("optimisation", {})
+        DescriptorOptimisationConfig, "optimisation", values.get("optimisation", {})
     )
     return checked_section(DescriptorTrainingConfig, "top level", values)
 

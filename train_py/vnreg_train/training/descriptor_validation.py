@@ -18,19 +18,14 @@ from vnreg_train.networks.descriptor import (
     input_features,
     split_pair,
 )
+from vnreg_train.training.descriptor_batches import network_batch
 from vnreg_train.training.descriptor_losses import MATCH_RADIUS
-from vnreg_train.training.descriptor_train import network_batch
+from vnreg_train.training.pose_errors import angle_deg, error_figures, pose_errors
 
 TOP = 320  # matches that the engine would look at
 ENCODED = 512
 GOOD_DEG, GOOD_SHIFT = 15.0, 0.2  # a pose that refinement brings home
 PAIRS = 16  # at once
-
-
-def angle_deg(rotation: Tensor) -> Tensor:
-    """Angle of rotations (…, 3, 3), by the chord, which keeps small angles."""
-    chord = torch.linalg.matrix_norm(rotation - torch.eye(3, dtype=rotation.dtype))
-    return 2 * torch.rad2deg(torch.asin((chord / 8**0.5).clamp(max=1.0)))
 
 
 def frame_rotation(source: Tensor, target: Tensor) -> Tensor:
@@ -72,10 +67,12 @@ def pose_figures(
     """What the poses are worth that single matches (rows, columns) propose by their frames.
 
     Per kind of frames: the share within 30 degrees where the match is right, whether any pose of
-    all matches is good (15 degrees, the centroid of the source within 0.2), and of the first 64.
+    all matches is good (15 degrees, the centroid of the source within 0.2), and of the first 64;
+    and the least rotation error of all whose centroid is in place (180 without such).
     """
     figures = {}
     any_good = torch.zeros(len(rows), dtype=torch.bool)
+    least = 180.0
     for name in ("frames_local", "frames_context"):
         rotation = frame_rotation(getattr(source, name)[rows], getattr(target, name)[columns])
         angle = angle_deg(rotation)
@@ -84,9 +81,13 @@ def pose_figures(
         centre = x.double().mean(0)
         offset = (rotation @ (centre - x[rows].double()).unsqueeze(2)).squeeze(2)
         placed = (y[columns].double() + offset - centre).norm(dim=1)
-        any_good |= (angle < GOOD_DEG) & (placed < GOOD_SHIFT)
+        in_place = placed < GOOD_SHIFT
+        any_good |= (angle < GOOD_DEG) & in_place
+        if in_place.any():
+            least = min(least, float(angle[in_place].min()))
     figures["proposed"] = float(any_good.any())
     figures["proposed_first_64"] = float(any_good[:64].any())
+    figures["proposed_rotation_deg"] = least
     figures["good_share"] = float(any_good.float().mean())
     return figures
 
@@ -99,9 +100,10 @@ def validate(
     points: int = 1024,
     most_encoded: int = ENCODED,
 ) -> dict[str, float]:
-    """Mean figures over the shapes, each in one pair of the recipe."""
+    """Figures over the shapes, each in one pair of the recipe: shares, and medians of errors."""
     sampler = MixtureSampler(shapes, points, min(PAIRS, len(shapes)), {recipe: 1.0}, seed=7)
     rows: list[dict[str, float]] = []
+    coarse = []
     for index in range(len(shapes) // sampler.batch_size):
         pairs = sampler.batch(index)
         encoded = min(most_encoded, int(pairs.source_count.min()), int(pairs.target_count.min()))
@@ -110,15 +112,28 @@ def validate(
         centres = batch.points[:, :encoded]
         features = network(centres, inputs)
         source, target = split_pair(features)
-        x, y = centres.chunk(2)
-        x = x + batch.shift.unsqueeze(1)
-        rotation, _ = procrustes(
+        rotation, translation = procrustes(
             source.global_feature.transpose(1, 2), target.global_feature.transpose(1, 2)
         )
-        coarse = angle_deg(rotation)
+        coarse.append(pose_errors(rotation, translation - batch.shift))
+        x, y = centres.chunk(2)
+        x = x + batch.shift.unsqueeze(1)
         for k in range(len(x)):
             one, other = (Features(*(f[k] for f in side)) for side in (source, target))
-            figures = match_figures(one, other, x[k], y[k])
-            rows.append(figures | {"coarse_15": float(coarse[k] < 15)})
-    names = sorted({name for row in rows for name in row})
-    return {name: float(np.mean([row[name] for row in rows if name in row])) for name in names}
+            rows.append(match_figures(one, other, x[k], y[k]))
+    return _over_pairs(rows) | _coarse_figures(torch.cat(coarse))
+
+
+def _over_pairs(rows: list[dict[str, float]]) -> dict[str, float]:
+    """Means of the shares, medians of the angles; of the pairs that have the figure."""
+    figures = {}
+    for name in sorted({name for row in rows for name in row}):
+        values = [row[name] for row in rows if name in row]
+        figures[name] = float((np.median if name.endswith("_deg") else np.mean)(values))
+    return figures
+
+
+def _coarse_figures(errors: Tensor) -> dict[str, float]:
+    """Of the pose by the global features alone."""
+    figures = {f"coarse_{name}": value for name, value in error_figures(errors).items()}
+    return figures | {"coarse_15": float((errors[:, 0] < GOOD_DEG).float().mean())}

@@ -25,6 +25,7 @@ from vnreg_train.training.losses import (
     occupancy_loss,
     registration_loss,
 )
+from vnreg_train.training.pose_errors import pose_errors, recall
 
 Losses = tuple[Tensor, dict[str, Tensor]]
 Pose = tuple[Tensor, Tensor]
@@ -87,7 +88,7 @@ class CoarseStage(nn.Module):
         if self.config.consistency_weight > 0:
             terms["consistency"] = consistency_loss(batch.turned(source), target)
             loss = loss + self.config.consistency_weight * terms["consistency"]
-        terms["recall"] = recall(*batch.residual(rotation, translation))
+        terms["recall"] = recall(pose_errors(*batch.residual(rotation, translation)))
         return loss, terms, (rotation, translation)
 
 
@@ -156,14 +157,12 @@ class Matching(nn.Module):
         self.network = network
         self.config = config
         self._describe = _compile_if(compiled, network.extractor.describe)
-        plain_compare = network.fine.compare
+        self._compare = _compile_if(compiled, self._compare_in_float32)
 
-        def compare(*clouds: Tensor) -> tuple[Tensor, Tensor]:
-            with self._autocast():
-                similarity, row_maxima = plain_compare(*clouds)
-            return similarity.float(), row_maxima.float()
-
-        network.fine.compare = _compile_if(compiled, compare)  # type: ignore[method-assign]
+    def _compare_in_float32(self, *clouds: Tensor) -> tuple[Tensor, Tensor]:
+        with self._autocast():
+            similarity, row_maxima = self.network.fine.compare(*clouds)
+        return similarity.float(), row_maxima.float()
 
     def _autocast(self) -> torch.autocast:
         return torch.autocast("cpu", torch.bfloat16, enabled=self.config.bfloat16)
@@ -187,6 +186,7 @@ class Matching(nn.Module):
             gather_points(y, chosen.target),
             gather_points(f_source, chosen.source),
             gather_points(f_target, chosen.target),
+            self._compare,
         )
         scores = self._significances(descriptors, chosen)
         terms = fine_loss(steps, *scores, chosen.is_match, chosen.truth)
@@ -194,8 +194,8 @@ class Matching(nn.Module):
         last = steps[-1]
         final = last.rotation @ rotation
         moved_t = (last.rotation @ translation.unsqueeze(-1)).squeeze(-1) + last.translation
-        terms["recall_coarse"] = recall(*batch.residual(rotation, translation))
-        terms["recall"] = recall(*batch.residual(final, moved_t))
+        terms["recall_coarse"] = recall(pose_errors(*batch.residual(rotation, translation)))
+        terms["recall"] = recall(pose_errors(*batch.residual(final, moved_t)))
         return loss, terms
 
     @torch.no_grad()
@@ -230,12 +230,3 @@ class Matching(nn.Module):
             return fine.significance(kept[0]).squeeze(-1), fine.significance(kept[1]).squeeze(-1)
         source, target = fine.significance(descriptors).squeeze(-1).chunk(2)
         return source.gather(1, chosen.source), target.gather(1, chosen.target)
-
-
-@torch.no_grad()
-def recall(rotation: Tensor, translation: Tensor) -> Tensor:
-    """Share of residual poses, (B, 3, 3) and (B, 3), within 5 degrees and 0.2."""
-    identity = torch.eye(3, dtype=rotation.dtype, device=rotation.device)
-    chord = torch.linalg.matrix_norm(rotation - identity)  # 2 sqrt(2) sin(angle / 2)
-    angle = 2 * torch.rad2deg(torch.asin((chord / 8**0.5).clamp(max=1.0)))
-    return ((angle < 5) & (translation.norm(dim=1) < 0.2)).float().mean()
