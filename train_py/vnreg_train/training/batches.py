@@ -133,11 +133,16 @@ class BatchSequence(Dataset[Batch]):
         return make_batch(sample, self.neighbours, self.rms_radius, rotation, apart)
 
     def loader(self, start: int) -> DataLoader[Batch]:
-        """Batches start, start + 1, … made by one worker process ahead of the training."""
+        """Batches start, start + 1, … made by one worker process ahead of the training.
+
+        Its generator is its own: a loader draws a number when it starts, and from torch's own
+        generator a run that was stopped and went on would draw one more than an unbroken one.
+        """
         return DataLoader(
             self,
             batch_size=None,
             sampler=range(start, self.steps),
             num_workers=1,
             prefetch_factor=4,
+            generator=torch.Generator(),
         )
