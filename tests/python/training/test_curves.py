@@ -32,16 +32,19 @@ def of_the_descriptor(folder: Path) -> AnyTrainer:
     return DescriptorTrainer(config, bent_boxes(8), folder, bent_boxes(4))
 
 
-def of_the_coarse_stage(folder: Path) -> AnyTrainer:
+def of_stage(stage: str, folder: Path) -> AnyTrainer:
     config = replace(tiny_config(), log_steps=2, validation_steps=4)
-    return StageTrainer(config, "coarse", bent_boxes(8), folder, bent_boxes(4))
+    return StageTrainer(config, stage, bent_boxes(8), folder, validation=bent_boxes(4))
+
+
+def of_the_coarse_stage(folder: Path) -> AnyTrainer:
+    return of_stage("coarse", folder)
 
 
 def of_the_fine_stage(folder: Path) -> AnyTrainer:
     if not (folder / "coarse.pt").exists():
         of_the_coarse_stage(folder).save()
-    config = replace(tiny_config(), log_steps=2, validation_steps=4)
-    return StageTrainer(config, "fine", bent_boxes(8), folder, bent_boxes(4))
+    return of_stage("fine", folder)
 
 
 Maker = Callable[[Path], AnyTrainer]
