@@ -32,7 +32,7 @@ endef
 debian-packages:
 	$(call install_debian,$(DEBIAN))
 
-$(VENV)/.installed: requirements/dev.txt requirements/train.txt | debian-packages
+$(VENV)/.installed: requirements/dev.txt requirements/train.txt requirements/batch.txt | debian-packages
 	python3 -m venv $(VENV)
 	$(PY) -m pip install -q -r requirements/dev.txt
 	$(PY) -m pip install -q --no-deps -e train_py
@@ -72,7 +72,7 @@ test-data: setup ## the test split of the furniture models, surfaces only
 check: setup ## formatting, lints, types
 	$(PY) -m ruff check train_py python tests/python tests/soak bench examples docs
 	$(PY) -m ruff format --check train_py python tests/python tests/soak bench examples docs
-	$(PY) -m mypy train_py/vnreg_train
+	$(PY) -m mypy train_py/vnreg_train python/vnreg/_batch
 
 sanitize: debian-packages ## the C++ tests under address and undefined-behaviour sanitizers
 	cmake --preset asan-ubsan > /dev/null

@@ -76,18 +76,19 @@ def _replacement(match: re.Match[str]) -> str:
 
 
 def module_reference(module: ModuleType) -> str:
-    """Every public name of the module, its signature from the type stub, and its docstring."""
-    stub = _stub_signatures(Path(str(module.__file__)).with_name("_vnreg.pyi"))
+    """Every public name of the module, its signature and its docstring."""
+    stub = Path(str(module.__file__)).with_name("_vnreg.pyi")
     parts = [inspect.getdoc(module) or ""]
     for name in module.__all__:
         thing = getattr(module, name)
         if name == "__version__":
             continue
-        parts += [f"## {name}", _signature(stub, name), _text(thing)]
+        signatures = _signatures(_source_file(thing, stub))
+        parts += [f"## {name}", _signature(signatures, name), _text(thing)]
         for member in vars(thing) if isinstance(thing, type) else ():
-            if not member.startswith("_"):
-                key = f"{name}.{member}"
-                parts += [f"### {key}", _signature(stub, key), _text(getattr(thing, member))]
+            key = f"{name}.{member}"
+            if not member.startswith("_") and key in signatures:
+                parts += [f"### {key}", _signature(signatures, key), _text(getattr(thing, member))]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -102,13 +103,22 @@ def _escaped(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
-def _signature(stub: dict[str, str], key: str) -> str:
-    text = stub.get(f"{key}.__init__", stub.get(key, ""))
+def _source_file(thing: Any, stub: Path) -> Path:
+    """Where a thing of Python is written; of what is compiled, the type stub."""
+    try:
+        written = inspect.getsourcefile(thing)
+    except TypeError:  # no class or function
+        return stub
+    return Path(written) if written else stub
+
+
+def _signature(signatures: dict[str, str], key: str) -> str:
+    text = signatures.get(f"{key}.__init__", signatures.get(key, ""))
     return f"```python\n{text}\n```" if text else ""
 
 
-def _stub_signatures(path: Path) -> dict[str, str]:
-    """{"align": "def align(...) -> Result", "Model.load": ...} of the type stub."""
+def _signatures(path: Path) -> dict[str, str]:
+    """{"align": "def align(...) -> Result", "Model.load": ...} of a type stub or a module."""
 
     signatures: dict[str, str] = {}
     for node in ast.parse(path.read_text(encoding="utf-8")).body:
@@ -116,5 +126,6 @@ def _stub_signatures(path: Path) -> dict[str, str]:
         prefix = f"{node.name}." if isinstance(node, ast.ClassDef) else ""
         for member in members:
             if isinstance(member, ast.FunctionDef):
-                signatures[prefix + member.name] = ast.unparse(member).removesuffix(": ...")
+                member.body = []
+                signatures[prefix + member.name] = ast.unparse(member).removesuffix(":")
     return signatures

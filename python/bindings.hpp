@@ -5,6 +5,8 @@
 
 namespace vnreg::python {
 
+/// parse_cloud.
+void bind_cloud_file(nanobind::module_& module);
 void bind_model(nanobind::module_& module);
 /// Result and Alternative.
 void bind_result(nanobind::module_& module);

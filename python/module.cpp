@@ -15,6 +15,7 @@ NB_MODULE(_vnreg, module) {
   module.def("instruction_set", &vnreg::instruction_set,
              "The instruction set this build was compiled for, such as 'x86-64-v3'.");
   vnreg::python::bind_error(module);
+  vnreg::python::bind_cloud_file(module);
   vnreg::python::bind_model(module);
   vnreg::python::bind_result(module);
   vnreg::python::bind_registrar(module);

@@ -5,9 +5,12 @@ result.T_target_source                  # (4, 4): target = R source + t
 result.status, result.confidence        # 'ok' and how sure it is
 
 For many pairs keep a Registrar, whose prepare() reads a cloud once for many alignments, or use
-align_many; Model.load reads weights other than the built-in ones.
+align_many; batch does tables of files, on many machines if need be, into parquet. Model.load reads
+weights other than the built-in ones, read_cloud the formats of the program.
 """
 
+from vnreg._batch import BatchReport, batch
+from vnreg._clouds import read_cloud
 from vnreg._vnreg import (
     Alternative,
     Cancellation,
@@ -20,10 +23,12 @@ from vnreg._vnreg import (
     align,
     align_many,
     instruction_set,
+    parse_cloud,
 )
 
 __all__ = [
     "Alternative",
+    "BatchReport",
     "Cancellation",
     "Error",
     "Model",
@@ -33,5 +38,8 @@ __all__ = [
     "__version__",
     "align",
     "align_many",
+    "batch",
     "instruction_set",
+    "parse_cloud",
+    "read_cloud",
 ]

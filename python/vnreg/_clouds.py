@@ -1,17 +1,33 @@
-"""Points of the objects that other libraries keep clouds and meshes in.
+"""Points of files, and of the objects that other libraries keep clouds and meshes in.
 
-Recognised by what they have, so that none of those libraries is imported.
+Those are recognised by what they have, so that none of those libraries is imported.
 """
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vnreg._vnreg import parse_cloud
+
 SURFACE_POINTS = 8192
 """Points drawn from the surface of a mesh."""
+
+
+def read_cloud(path: str | os.PathLike[str]) -> NDArray[np.float64]:
+    """The points (N, 3) of a file, of any format that parse_cloud knows.
+
+    Raises OSError where it cannot be read, ValueError where its content is wrong.
+    """
+    path = Path(path)
+    try:
+        return parse_cloud(path.read_bytes(), path.suffix)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
 
 
 def points_of(cloud: Any) -> Any:

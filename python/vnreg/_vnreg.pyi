@@ -23,6 +23,7 @@ _Cloud: TypeAlias = ArrayLike | PreparedCloud | Any
 __version__: str
 
 def instruction_set() -> str: ...
+def parse_cloud(content: bytes, name: str = "") -> NDArray[np.float64]: ...
 
 class Error(RuntimeError):
     code: str
