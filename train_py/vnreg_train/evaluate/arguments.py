@@ -4,31 +4,79 @@ from __future__ import annotations
 
 import argparse
 import os
-from typing import Any
 
-Subcommands = Any  # argparse names the type privately
+from vnreg_train.command_help import Lesson, Subcommands, add_command
+
+SPLITS = ("train", "validation", "test")
+
+EVALUATE = Lesson(
+    summary="measure methods on rows of pairs",
+    reads="The shapes of a split, and their symmetries (data/symmetries); a model file, or the "
+    "built-in model. Peers need requirements/evaluate.txt.",
+    writes="RUN/METHOD/ROW.jsonl, every answer; a second call makes what is missing. Prints a "
+    "line for each row and method.",
+    takes="Mode verified 1 minute for all 29 rows of the test split (15 ms a pair); all modes and "
+    "peers half an hour of one core.",
+    example="evaluate --split validation --rows bars --shapes 40",
+)
+DISJOINT = Lesson(
+    summary="how sure the engine is of pairs of different objects",
+    reads="The shapes of a split, of which two different ones make a pair.",
+    writes="Nothing. Prints how many confidences are above 0.5, 0.8 and 0.9, though every pose is "
+    "wrong, and the statuses.",
+    takes="25 ms a pair: half a minute with the defaults.",
+    example="disjoint --pairs 1000 --split validation",
+)
+CALIBRATE = Lesson(
+    summary="fit the confidence of a model file on validation pairs",
+    reads="A model file; pairs of the split, which the engine aligns; the shapes' symmetries.",
+    writes="OUT: the model with its calibration, by which the engine tells its confidence (NaN "
+    "without one). Prints the numbers, and how they do on pairs that they were not fitted to.",
+    takes="2 minutes of one core with the defaults (4,000 pairs).",
+    example="calibrate mine.vnr --out mine.vnr --different 1500",
+)
+FIND_SYMMETRIES = Lesson(
+    summary="list the symmetries of the furniture models",
+    reads="The shapes, and their meshes in the package that build-data keeps in --cache.",
+    writes="OUT: for each shape the rotations that leave it as it is, by which recall up to "
+    "symmetry is counted.",
+    takes="Some 3 seconds of one core a shape: 40 minutes for all 820.",
+    example="find-symmetries --splits validation --out symmetries.json",
+)
+TUNE_PEERS = Lesson(
+    summary="choose the peers' settings",
+    reads="Validation pairs, and the grid of settings of each peer (evaluate/tuned_peers.json says "
+    "what was tried). Needs requirements/evaluate.txt.",
+    writes="evaluate/tuned_peers.json: the settings that register most pairs, with the grids.",
+    takes="Some 15 minutes of one core with all peers.",
+    example="tune-peers --peers small_gicp --shapes 12",
+)
+REPORT = Lesson(
+    summary="write the results of a run down: page, JSON and plots",
+    reads="The folder that `evaluate --run` filled.",
+    writes="OUT, a page; beside it a folder of its name with results.json (every figure) and plots "
+    "as SVG: recall against angle, overlap and noise, reliability, failures by category. The same "
+    "answers give the same bytes.",
+    takes="A few minutes: the pairs are made again to tell the twins among the failures.",
+    example="report --run runs/evaluate --out docs/results.md",
+)
 
 
 def add_evaluation_commands(commands: Subcommands) -> None:
     """evaluate, disjoint, calibrate, find-symmetries, tune-peers, report."""
-    _add_evaluate(commands.add_parser("evaluate", help="measure methods on rows of pairs"))
-    _add_disjoint(
-        commands.add_parser("disjoint", help="how sure the engine is of pairs of different objects")
-    )
-    _add_calibrate(commands.add_parser("calibrate", help="fit the confidence on validation pairs"))
-    _add_find_symmetries(
-        commands.add_parser("find-symmetries", help="list the symmetries of the furniture models")
-    )
-    _add_tune_peers(commands.add_parser("tune-peers", help="choose the peers' settings"))
-    _add_report(commands.add_parser("report", help="write the results of a run down"))
+    _add_evaluate(add_command(commands, "evaluate", EVALUATE))
+    _add_disjoint(add_command(commands, "disjoint", DISJOINT))
+    _add_calibrate(add_command(commands, "calibrate", CALIBRATE))
+    _add_find_symmetries(add_command(commands, "find-symmetries", FIND_SYMMETRIES))
+    _add_tune_peers(add_command(commands, "tune-peers", TUNE_PEERS))
+    _add_report(add_command(commands, "report", REPORT))
 
 
 def _add_pairing(command: argparse.ArgumentParser, split: str, seed: int) -> None:
     command.add_argument("--data", default="data/furniture", help="folder of the shapes")
-    command.add_argument("--split", default=split, choices=("train", "validation", "test"))
+    command.add_argument("--split", default=split, choices=SPLITS, help="of the shapes")
     command.add_argument("--shapes", type=int, help="only so many, spread evenly over the split")
-    command.add_argument("--seed", type=int, default=seed)
-    command.add_argument("--jobs", type=int, default=1, help="processes, one thread each")
+    command.add_argument("--seed", type=int, default=seed, help="of the pairs")
 
 
 def _add_evaluate(command: argparse.ArgumentParser) -> None:
@@ -36,11 +84,14 @@ def _add_evaluate(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--rows", nargs="+", default=["all"], help="all, bars, p0, p1, or names with wildcards"
     )
-    command.add_argument("--methods", nargs="+", default=["verified"])
+    command.add_argument(
+        "--methods", nargs="+", default=["verified"], help="modes, peers, or names of either"
+    )
     command.add_argument("--model", help="for mode verified, a .vnr file (default: built in)")
     command.add_argument(
         "--paper-model", default="models/small.vnr", help="for modes coarse, paper"
     )
+    command.add_argument("--jobs", type=int, default=1, help="processes, one thread each")
     command.add_argument("--failures", action="store_true", help="list the pairs that were lost")
     command.add_argument("--run", help="folder that keeps the answers; a second call goes on")
     command.set_defaults(run_command=_evaluate)
@@ -48,19 +99,21 @@ def _add_evaluate(command: argparse.ArgumentParser) -> None:
 
 def _add_disjoint(command: argparse.ArgumentParser) -> None:
     command.add_argument("--data", default="data/furniture", help="folder of the shapes")
-    command.add_argument("--split", default="validation", choices=("train", "validation", "test"))
-    command.add_argument("--pairs", type=int, default=1000)
-    command.add_argument("--seed", type=int, default=0)
+    command.add_argument("--split", default="validation", choices=SPLITS, help="of the shapes")
+    command.add_argument("--pairs", type=int, default=1000, help="how many")
+    command.add_argument("--seed", type=int, default=0, help="of the pairs")
     command.set_defaults(run_command=_disjoint)
 
 
 def _add_calibrate(command: argparse.ArgumentParser) -> None:
     command.add_argument("model", help="a .vnr file")
-    command.add_argument("--mode", default="verified", choices=("paper", "verified"))
+    command.add_argument(
+        "--mode", default="verified", choices=("paper", "verified"), help="whose confidence"
+    )
     command.add_argument("--data", default="data/furniture", help="folder of the shapes")
-    command.add_argument("--split", default="validation", choices=("train", "validation"))
+    command.add_argument("--split", default="validation", choices=SPLITS[:2], help="of the shapes")
     command.add_argument("--shapes", type=int, help="only so many, spread evenly over the split")
-    command.add_argument("--seeds", nargs="+", type=int, default=[11, 12, 13])
+    command.add_argument("--seeds", nargs="+", type=int, default=[11, 12, 13], help="of the pairs")
     command.add_argument(
         "--different", type=int, default=0, help="so many pairs of different objects, too"
     )
@@ -69,10 +122,12 @@ def _add_calibrate(command: argparse.ArgumentParser) -> None:
 
 
 def _add_find_symmetries(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--data", default="data/furniture")
+    command.add_argument("--data", default="data/furniture", help="folder of the shapes")
     command.add_argument("--cache", default="data/furniture/cache", help="where packages are kept")
-    command.add_argument("--splits", nargs="+", default=["train", "validation", "test"])
-    command.add_argument("--out", default="data/symmetries/furniture.json")
+    command.add_argument(
+        "--splits", nargs="+", default=list(SPLITS), choices=SPLITS, help="only these"
+    )
+    command.add_argument("--out", default="data/symmetries/furniture.json", help="the list")
     command.set_defaults(run_command=_find_symmetries)
 
 
