@@ -23,7 +23,7 @@ JSON = ROOT / "docs" / "benchmark" / "benchmark.json"
 
 def parts() -> dict[str, Callable[[Settings], dict[str, Any]]]:
     """What a run consists of; imported only where it runs."""
-    from vnreg_bench import contest, engine_times, footprint, kernels, low_precision, peers
+    from vnreg_bench import batch, contest, engine_times, footprint, kernels, low_precision, peers
 
     return {
         "kernels": kernels.kernels,
@@ -35,6 +35,7 @@ def parts() -> dict[str, Callable[[Settings], dict[str, Any]]]:
         "contest": contest.contest,
         "peers": peers.peers,
         "low_precision": low_precision.low_precision,
+        "batch": batch.batch,
     }
 
 

@@ -242,6 +242,14 @@ BARS = (
         "{:.2f} MB",
         False,
     ),
+    Bar(
+        "`vnreg.batch`, two worker processes against one",
+        lambda report: float(report["batch"]["gain"]["median"]),
+        1.8,
+        1.95,
+        "{:.2f}×",
+        True,
+    ),
     Bar("load + first align, cold process", _cold_ms, 30, 10, "{:.1f} ms", False),
 )
 

@@ -15,6 +15,7 @@ RUNS = {
     "kernels": "kernel_repetitions",
     "latency": "latency_pairs",
     "peers": "peer_shapes",
+    "batch": "batch_rounds",
 }
 
 
@@ -374,6 +375,25 @@ def low_precision_verdict(report: Report) -> str:
     return text
 
 
+def batch_section(report: Report) -> list[str]:
+    of = report["batch"]
+    lines = []
+    for workers, times in of["ms"].items():
+        rate = 1e3 * of["pairs"] / times["median"]
+        lines.append((workers, _ms(times), _figure(rate), _figure(1e3 * int(workers) / rate)))
+    gain = of["gain"]
+    return [
+        f"`vnreg.batch` of {of['pairs']} pairs of files, {of['points']:,} points each, parts of "
+        f"{of['part_rows']} rows, on clusters that are up; every worker has a processor, scheduler "
+        "and client run beside them. Rounds call both in turns.",
+        table(("workers", "ms", "pairs/s", "worker's ms a pair"), lines),
+        f"Gain of the second worker: {gain['median']:.2f}× (quartiles {gain['q1']:.2f} and "
+        f"{gain['q3']:.2f}). A part costs {_figure(of['part_ms'])} ms beside its pairs, a row "
+        f"{of['row_bytes']:.0f} bytes; the client makes parts of a parquet table at "
+        f"{of['client']['pairs_per_s']:,.0f} pairs/s.",
+    ]
+
+
 SECTIONS: tuple[tuple[str, str, Callable[[Report], list[str]]], ...] = (
     ("points", "Time against points", points_section),
     ("channels", "Time against channels", channels_section),
@@ -384,6 +404,7 @@ SECTIONS: tuple[tuple[str, str, Callable[[Report], list[str]]], ...] = (
     ("contest", "Other runtimes, same weights", contest_section),
     ("kernels", "Kernels against the roofline", kernels_section),
     ("low_precision", "Lower precision", low_precision_section),
+    ("batch", "Many pairs on worker processes", batch_section),
 )
 
 

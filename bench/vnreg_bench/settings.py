@@ -24,6 +24,8 @@ class Settings:
     peer_shapes: int = 82
     peer_rows: tuple[str, ...] = ("P1/noise_0.01", "P1/partial_75_noise_0.01")
     kernel_repetitions: int = 7
+    batch_pairs: int = 240
+    batch_rounds: int = 5
     kernel_filter: str = "."
 
     def to_json(self) -> dict[str, Any]:
@@ -44,4 +46,6 @@ class Settings:
             peer_shapes=60,
             peer_rows=("P1/noise_0.01",),
             kernel_repetitions=3,
+            batch_pairs=80,
+            batch_rounds=3,
         )
