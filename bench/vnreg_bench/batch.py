@@ -26,7 +26,7 @@ from vnreg_bench.timing import interleaved, summary
 
 POINTS = 1024
 CLOUD_PAIRS = 40
-PART_ROWS = 10
+PART_ROWS = 30
 EMPTY_PARTS = 200
 TABLE_ROWS = 200_000
 
