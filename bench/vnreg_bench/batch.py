@@ -28,6 +28,7 @@ POINTS = 1024
 CLOUD_PAIRS = 40
 PART_ROWS = 30
 EMPTY_PARTS = 200
+LARGE_PART_ROWS = 1000
 TABLE_ROWS = 200_000
 
 Pairs = list[tuple[str, str]]
@@ -103,14 +104,14 @@ def ms_per_part(folder: Path, client: Client) -> float:
 
 def bytes_per_row(folder: Path, client: Client) -> float:
     """In a part file of many rows, no two of the same clouds."""
-    output, count = folder / "one_part", 1000
-    names = [str(folder / f"{i:09d}.npy") for i in range(count + 1)]
+    output = folder / "one_part"
+    names = [str(folder / f"{i:09d}.npy") for i in range(LARGE_PART_ROWS + 1)]
     for seed, name in enumerate(names):
         np.save(name, bent_box(32, seed)[0])
     pairs = list(zip(names, names[1:], strict=False))
-    vnreg.batch(pairs, output, address=client, part_rows=count)
+    vnreg.batch(pairs, output, address=client, part_rows=len(pairs))
     (part,) = output.glob("part-*")
-    return part.stat().st_size / count
+    return part.stat().st_size / len(pairs)
 
 
 def client_speed(folder: Path) -> dict[str, float]:

@@ -83,3 +83,24 @@ def test_pictures_are_the_same_for_the_same_figures(report: dict[str, Any], tmp_
 def test_series_are_split_by_what_stands_before_the_number() -> None:
     times = {"a/1": {"median": 2.0}, "b c/1": {"median": 3.0}, "a/2": {"median": 4.0}}
     assert series(times) == {"a": ([1, 2], [2.0, 4.0]), "b c": ([1], [3.0])}
+
+
+def test_the_page_tells_what_batches_cost(report: dict[str, Any], tmp_path: Path) -> None:
+    quartiles = {"q1": 1.8, "q3": 2.0}
+    report["batch"] = {
+        "points": 1024,
+        "pairs": 240,
+        "part_rows": 30,
+        "ms": {"1": {"median": 3000.0}, "2": {"median": 1600.0}},
+        "gain": {"median": 1.875, **quartiles},
+        "part_ms": 7.1,
+        "row_bytes": 166.0,
+        "client": {"pairs_per_s": 225_000.0, "parts": 20, "grown_mb": 15.0},
+    }
+    report["measured"]["batch"] = report["measured"]["kernels"]
+    report["measured"]["batch"]["settings"]["batch_rounds"] = 5
+    page = markdown(report, {})
+    assert "| 1 | 3,000 | 80.0 | 12.5 |" in page
+    assert "| 2 | 1,600 | 150 | 13.3 |" in page
+    assert "Gain of the second worker: 1.88×" in page and "a row 166 bytes" in page
+    assert verdict(report, "two worker processes")["met"]

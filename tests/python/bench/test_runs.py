@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from vnreg_bench import engine_times, low_precision
+from vnreg_bench import batch, engine_times, low_precision
 from vnreg_bench.inputs import SHIPPED, bent_box, random_paper_model
 from vnreg_bench.settings import Settings
 
@@ -76,3 +76,13 @@ def test_rounded_weights_are_those_of_bfloat16(tmp_path: Path) -> None:
         np.testing.assert_allclose(values, before[name], rtol=2**-8)
         changed += int((values != before[name]).sum())
     assert changed > 60_000
+
+
+def test_batches_of_one_and_two_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("EMPTY_PARTS", "LARGE_PART_ROWS", "TABLE_ROWS", "PART_ROWS"):
+        monkeypatch.setattr(batch, name, 3)
+    found = batch.batch(replace(TINY, batch_pairs=6, batch_rounds=2))
+    assert set(found["ms"]) == {"1", "2"}
+    assert found["gain"]["runs"] == 2 and found["gain"]["median"] > 0
+    assert found["part_ms"] > 0 and found["client"]["parts"] == 1
+    assert found["row_bytes"] > 16 * 8  # a pose alone
