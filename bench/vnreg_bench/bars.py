@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vnreg_bench.peers import LOCAL
-from vnreg_train.evaluate.report import TITLES
+from vnreg_train.evaluate.titles import TITLES
 
 Report = Mapping[str, Any]
 PAPER_PAIRS_PER_S = 36.4  # Lin et al., ICRA 2023, on a Titan RTX

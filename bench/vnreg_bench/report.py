@@ -7,7 +7,8 @@ from typing import Any
 
 from vnreg_bench.bars import fastest_global_peer, verdicts
 from vnreg_bench.peers import LOCAL
-from vnreg_train.evaluate.report import TITLES, table
+from vnreg_train.evaluate.report import table
+from vnreg_train.evaluate.titles import TITLES
 
 Report = Mapping[str, Any]
 # What a part's medians are over, where it is not rounds: the name of the setting.

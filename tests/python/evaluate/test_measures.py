@@ -8,14 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
+from vnreg_train.evaluate.failure_kinds import KINDS, MEANINGS, by_category, failure_kinds
 from vnreg_train.evaluate.measures import (
-    by_overlap,
+    OVERLAP_EDGES,
+    binned_recall,
     confidence,
     failures,
     measure,
     nees,
     share,
     wilson_interval,
+    wilson_lengths,
 )
 from vnreg_train.evaluate.scores import Scores
 
@@ -31,6 +34,7 @@ def scores(rotation: list[float], **columns: object) -> Scores:
         "symmetric_rotation_deg": degrees,
         "symmetric_translation": translation,
         "overlap": np.ones(count),
+        "angle_deg": np.zeros(count),
         "same_crop": np.full(count, -1),
         "symmetric_shape": np.zeros(count, bool),
         "ms": np.arange(count) + 1.0,
@@ -78,12 +82,40 @@ def test_the_halves_of_partial_are_counted_apart() -> None:
 
 
 def test_recall_by_overlap_puts_each_pair_into_its_bin() -> None:
-    bins = by_overlap(scores([1, 9, 1, 1, 9], overlap=[0.0, 0.19, 0.2, 1.0, 0.99]))
+    found = scores([1, 9, 1, 1, 9], overlap=[0.0, 0.19, 0.2, 1.0, 0.99])
+    bins = binned_recall(found, found.overlap, OVERLAP_EDGES)
     assert [(b["from"], b["to"], b["hits"], b["pairs"]) for b in bins] == [
         (0.0, 0.2, 1, 2),
         (0.2, 0.4, 1, 1),
         (0.8, 1.0, 1, 2),
     ]
+
+
+def test_the_bars_of_a_plot_end_where_the_intervals_do() -> None:
+    counts = [(0, 7), (5, 9), (12, 12)]
+    below, above = wilson_lengths(counts)
+    for (hits, trials), down, up in zip(counts, below, above, strict=True):
+        expected = wilson_interval(hits, trials)
+        assert (hits / trials - down, hits / trials + up) == pytest.approx(expected)
+
+
+def test_kinds_of_failure_by_what_the_pose_looks_like() -> None:
+    found = scores(
+        [1, 180, 12, 90, 170, 170, 90, 90],
+        twin=[0, 0, 1, 1, 1, 0, 0, 0],
+        overlap=[0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.9],
+        confidence=[0.9, np.nan, 0.9, 0.2, 0.9, 0.1, 0.1, 0.6],
+    )
+    kinds = [KINDS[k] for k in failure_kinds(found)]
+    assert kinds[:4] == ["right", "no pose", "near miss", "twin"]
+    assert kinds[4:] == ["twin", "flipped", "little overlap", "other"]
+    table = by_category(found, ["lamp", "lamp", "lamp", "sofa", "sofa", "sofa", "sofa", "sofa"])
+    assert list(table) == ["lamp", "sofa"]
+    assert table["lamp"]["pairs"] == 3 and table["sofa"]["twin"] == 2
+    assert (table["lamp"]["sure"], table["sofa"]["sure"]) == (1, 2)
+    for counts in table.values():
+        assert sum(counts[kind] for kind in KINDS) == counts["pairs"]
+    assert set(MEANINGS) == set(KINDS[1:])
 
 
 def test_each_failure_counts_once_where_it_fits_first() -> None:

@@ -6,12 +6,15 @@ import copy
 import json
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from vnreg_train.evaluate.bars import RECALL_BARS, peer_gap, verdicts
 from vnreg_train.evaluate.measures import wilson_interval
-from vnreg_train.evaluate.plots import draw_plots
+from vnreg_train.evaluate.plots import PLOTS, draw_plots
+from vnreg_train.evaluate.recall_plots import against_noise
 from vnreg_train.evaluate.report import markdown
 from vnreg_train.evaluate.results import collect_results, write_results
 from vnreg_train.evaluate.rows import BAR_ROWS, ROWS, select_rows
@@ -101,7 +104,7 @@ def test_a_peer_without_failures_can_only_be_equalled(run: Path, pairing: Pairin
 def test_the_page_tells_the_figures(run: Path, pairing: Pairing, tmp_path: Path) -> None:
     results = collect_results(run, pairing, SHAPES)
     plots = draw_plots(results, tmp_path / "plots")
-    assert [name for _, name in plots] == ["overlap.svg", "reliability.svg"]
+    assert [name for _, name in plots] == [name for _, name, _ in PLOTS]
     page = markdown(results, plots)
     low, high = wilson_interval(5, 6)
     figure = f"83.3 ({100 * low:.1f}–{100 * high:.1f})"
@@ -111,7 +114,39 @@ def test_the_page_tells_the_figures(run: Path, pairing: Pairing, tmp_path: Path)
     assert "| noise_0.01 | 1 | 0 | 1 | 0 | 0 | 0 | 0 |" in page  # the failure, among alternatives
     assert "| noise_0.01 | Open3D FPFH + FGR + ICP | 4 | 1 |" in page
     assert "| Open3D FPFH + FGR + ICP | open3d 1.0 | radius 0.1 |" in page
-    assert "(results/overlap.svg)" in page and "6 pairs a row" in page
+    assert all(f"](results/{name})" in page for _, name in plots) and "6 pairs a row" in page
+    # Of three P1 rows, whose sixth shape is turned by 90 degrees.
+    assert "| airplane | 18 | 16.7 | 0 | 0 | 0 | 0 | 1 | 2 | 0 |" in page
+
+
+def test_plots_tell_their_lines_in_words_and_every_method_once(
+    run: Path, pairing: Pairing, tmp_path: Path
+) -> None:
+    draw_plots(collect_results(run, pairing, SHAPES), tmp_path)
+    texts = {
+        path.name: [element.text for element in ElementTree.parse(path).iter() if element.text]
+        for path in tmp_path.glob("*.svg")
+    }
+    for name in ("angle.svg", "noise.svg", "overlap.svg"):
+        words = [text.strip() for text in texts[name]]
+        assert words.count("verified") == words.count("Open3D FPFH + FGR + ICP") == 1
+        assert "recall, %" in words
+    assert "airplane" in texts["categories.svg"] and "near miss" in texts["categories.svg"]
+    assert all(path.stat().st_size < 200_000 for path in tmp_path.iterdir())
+
+
+def test_the_lines_go_through_the_figures(run: Path, pairing: Pairing) -> None:
+    results = collect_results(run, pairing, SHAPES)
+    figure = against_noise(results)
+    assert figure is not None
+    panels = {axes.get_title(): axes for axes in figure.axes if axes.get_title()}
+    heights = [line.get_ydata()[0] for line in panels["50% kept"].lines if len(line.get_ydata())]
+    assert sorted(set(heights)) == pytest.approx([100 * 2 / 6, 100 * 5 / 6])
+    bars = [bar.get_segments()[0][:, 1] for bar in panels["whole"].collections]
+    for low, high in bars:
+        assert 0 <= low < high <= 100
+    expected = [100 * end for end in wilson_interval(5, 6)]
+    assert any(np.allclose(bar, expected) for bar in bars)
 
 
 def test_every_table_has_the_columns_of_its_head(run: Path, pairing: Pairing) -> None:

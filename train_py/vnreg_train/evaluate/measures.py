@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from vnreg_train.evaluate.confidence import auroc, reliability
 from vnreg_train.evaluate.scores import GROSS_DEG, LIMITS, Bools, Scores
 
 OVERLAP_EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
+ANGLE_EDGES = (0.0, 45.0, 90.0, 135.0, 180.0)
 NEES_DIMENSIONS = 6
 NEAR_DEG = 15.0
 
@@ -25,6 +27,13 @@ def wilson_interval(hits: int, trials: int, z: float = 1.959964) -> tuple[float,
     spread = z * math.sqrt(share * (1 - share) / trials + z * z / (4 * trials * trials))
     scale = 1 + z * z / trials
     return max(0.0, (middle - spread) / scale), min(1.0, (middle + spread) / scale)
+
+
+def wilson_lengths(counts: Sequence[tuple[int, int]]) -> tuple[list[float], list[float]]:
+    """How far the intervals of (hits, trials) reach below and above the shares; for error bars."""
+    ends = [(hits / trials, *wilson_interval(hits, trials)) for hits, trials in counts]
+    below = [max(0.0, middle - low) for middle, low, _ in ends]
+    return below, [max(0.0, high - middle) for middle, _, high in ends]
 
 
 def limit_name(limit: tuple[float, float]) -> str:
@@ -56,7 +65,8 @@ def measure(scores: Scores) -> dict[str, Any]:
         "symmetric_gross": share(scores.symmetric_rotation_deg > GROSS_DEG),
         "ms": _quantiles(scores.ms),
         "halves": _halves(scores),
-        "by_overlap": by_overlap(scores),
+        "by_overlap": binned_recall(scores, scores.overlap, OVERLAP_EDGES),
+        "by_angle": binned_recall(scores, scores.angle_deg, ANGLE_EDGES),
         "failures": failures(scores),
         "confidence": confidence(scores),
         "nees": nees(scores),
@@ -84,13 +94,15 @@ def _halves(scores: Scores) -> dict[str, Any] | None:
     }
 
 
-def by_overlap(scores: Scores) -> list[dict[str, Any]]:
-    """Recall up to symmetry in bins of the true overlap; empty bins are left out."""
-    last = len(OVERLAP_EDGES) - 2
-    index = np.clip(np.digitize(scores.overlap, OVERLAP_EDGES) - 1, 0, last)
+def binned_recall(
+    scores: Scores, values: Float64, edges: tuple[float, ...]
+) -> list[dict[str, Any]]:
+    """Recall up to symmetry in bins of the pairs' values (N,); empty bins are left out."""
+    last = len(edges) - 2
+    index = np.clip(np.digitize(values, edges) - 1, 0, last)
     right = scores.symmetric()
     return [
-        {"from": OVERLAP_EDGES[k], "to": OVERLAP_EDGES[k + 1], **share(right[index == k])}
+        {"from": edges[k], "to": edges[k + 1], **share(right[index == k])}
         for k in range(last + 1)
         if (index == k).any()
     ]

@@ -1,8 +1,11 @@
-"""The pictures of docs/results.md, as SVG that is the same for the same figures."""
+"""The pictures of docs/results.md, as SVG that is the same for the same figures.
+
+Text stays text and nothing depends on the day, so that a picture's diff is as small as its change.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +16,26 @@ matplotlib.use("svg")
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from vnreg_train.evaluate.bars import METHOD
-from vnreg_train.evaluate.report import TITLES
+from vnreg_train.evaluate.confusion_plot import confusion
+from vnreg_train.evaluate.recall_plots import against_angle, against_noise, against_overlap
+from vnreg_train.evaluate.reliability_plot import calibration
 
-STYLE: Any = {"svg.hashsalt": "vnreg", "font.size": 9, "axes.grid": True, "grid.alpha": 0.3}
-WIDE, SQUARE = (6.4, 3.6), (4.0, 4.0)
+Draw = Callable[[Mapping[str, Any]], Figure | None]
+STYLE: Any = {
+    "svg.hashsalt": "vnreg",
+    "svg.fonttype": "none",
+    "font.size": 9,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.alpha": 0.3,
+}
+PLOTS: tuple[tuple[str, str, Draw], ...] = (
+    ("Recall against the angle of the rotation", "angle.svg", against_angle),
+    ("Recall up to symmetry against overlap, all cropped P1 rows", "overlap.svg", against_overlap),
+    ("Recall up to symmetry against noise, P1", "noise.svg", against_noise),
+    ("Reliability of mode verified's confidence", "reliability.svg", calibration),
+    ("Failures of mode verified by category and kind", "categories.svg", confusion),
+)
 
 
 def draw_plots(results: Mapping[str, Any], folder: Path) -> list[tuple[str, str]]:
@@ -25,56 +43,11 @@ def draw_plots(results: Mapping[str, Any], folder: Path) -> list[tuple[str, str]
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     with plt.rc_context(STYLE):
-        for caption, name, draw in (
-            ("Recall up to symmetry against overlap, all cropped P1 rows", "overlap.svg", overlap),
-            ("Reliability of mode verified's confidence", "reliability.svg", calibration),
-        ):
+        for caption, name, draw in PLOTS:
             figure = draw(results)
             if figure is not None:
-                figure.savefig(folder / name, metadata={"Date": None}, bbox_inches="tight")
+                about = {"Date": None, "Creator": None}
+                figure.savefig(folder / name, metadata=about, bbox_inches="tight")
                 plt.close(figure)
                 written.append((caption, name))
     return written
-
-
-def overlap(results: Mapping[str, Any]) -> Figure | None:
-    """Recall in bins of the true overlap, one line per method, the P1 partial rows together."""
-    rows = [of for name, of in results["rows"].items() if name.startswith("P1/partial")]
-    methods = [method for method in TITLES if any(method in of for of in rows)]
-    if not methods:
-        return None
-    figure, axes = plt.subplots(figsize=WIDE)
-    for method in methods:
-        sums: dict[float, list[int]] = {}
-        for found in (b for of in rows if method in of for b in of[method]["by_overlap"]):
-            total = sums.setdefault((found["from"] + found["to"]) / 2, [0, 0])
-            total[0] += found["hits"]
-            total[1] += found["pairs"]
-        middles = sorted(sums)
-        shares = [100 * sums[middle][0] / sums[middle][1] for middle in middles]
-        width = 2.5 if method == METHOD else 1.0
-        label = TITLES[method].strip("*")
-        axes.plot(middles, shares, marker="o", markersize=3, linewidth=width, label=label)
-    axes.set(xlabel="true overlap", ylabel="recall, %", xlim=(0, 1), ylim=(0, 102))
-    axes.legend(fontsize=7)
-    return figure
-
-
-def calibration(results: Mapping[str, Any]) -> Figure | None:
-    """Share of right poses against confidence, P0 and P1 apart; circles by numbers of pairs."""
-    pools = results["pooled"].get(METHOD, {})
-    found = {name: pools[name]["confidence"] for name in ("P0", "P1") if name in pools}
-    if not any(found.values()):
-        return None
-    figure, axes = plt.subplots(figsize=SQUARE)
-    axes.plot([0, 1], [0, 1], color="grey", linewidth=0.8)
-    for name, figures in found.items():
-        if figures:
-            bins = figures["bins"]
-            sizes = [10 + 200 * n / figures["pairs"] for n in bins["pairs"]]
-            label = f"{name}: ECE {figures['ece']:.3f}"
-            axes.plot(bins["confidence"], bins["right"], linewidth=0.8)
-            axes.scatter(bins["confidence"], bins["right"], s=sizes, alpha=0.6, label=label)
-    axes.set(xlabel="confidence", ylabel="share of right poses", xlim=(0, 1.02), ylim=(0, 1.02))
-    axes.legend(loc="upper left")
-    return figure

@@ -7,25 +7,18 @@ from typing import Any
 
 from vnreg_train.data.protocol import ANGLES_DEG
 from vnreg_train.evaluate.bars import LIMIT, METHOD, peer_gap, verdicts
+from vnreg_train.evaluate.failure_kinds import KINDS, MEANINGS, SURE
 from vnreg_train.evaluate.measures import NEAR_DEG, limit_name
 from vnreg_train.evaluate.methods import MODES
 from vnreg_train.evaluate.pairs import MAX_VIEW_ANGLE_DEG
 from vnreg_train.evaluate.peers import PEERS
 from vnreg_train.evaluate.rows import PAPER_SETTINGS
 from vnreg_train.evaluate.scores import GROSS_DEG, LIMITS
+from vnreg_train.evaluate.titles import TITLES
 from vnreg_train.evaluate.twins import NEAR
 from vnreg_train.evaluate.twins import SHARE as TWIN_SHARE
 
 Results = Mapping[str, Any]
-TITLES = {
-    "coarse": "coarse",
-    "paper": "paper",
-    "verified": "**verified**",
-    "open3d_ransac_icp": "Open3D FPFH + RANSAC + ICP",
-    "open3d_fgr_icp": "Open3D FPFH + FGR + ICP",
-    "kiss_matcher_icp": "KISS-Matcher + ICP",
-    "small_gicp": "small_gicp",
-}
 # Recall in % at 45, 90, 135, 180 degrees (Lin et al., ICRA 2023, ModelNet40).
 PAPER_RECALL = {
     "clean": (100.0, 100.0, 100.0, 100.0),
@@ -52,17 +45,30 @@ def markdown(results: Results, plots: Sequence[tuple[str, str]], folder: str = "
         views_section(results),
         "## Recall against overlap",
         overlap_table(results),
-        *(f"![{caption}]({folder}/{name})" for caption, name in plots),
+        _picture(plots, "overlap.svg", folder),
+        "## Recall against noise and angle",
+        "Bars are 95 % Wilson intervals. An equivariant network asks nothing of the angle; what "
+        "starts from a guess does.",
+        _picture(plots, "noise.svg", folder),
+        _picture(plots, "angle.svg", folder),
         "## Confidence and covariance",
         confidence_section(results),
+        _picture(plots, "reliability.svg", folder),
         "## Where the failures of mode verified come from",
         failures_table(results),
+        categories_section(results),
+        _picture(plots, "categories.svg", folder),
         "## Time",
         time_table(results),
         "## Peers",
         peers_section(results),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _picture(plots: Sequence[tuple[str, str]], wanted: str, folder: str) -> str:
+    found = [caption for caption, name in plots if name == wanted]
+    return f"![{found[0]}]({folder}/{wanted})" if found else ""
 
 
 def how_measured(results: Results) -> str:
@@ -283,6 +289,38 @@ def failures_table(results: Results) -> str:
     )
     head = ["row", "failures", f"within {NEAR_DEG:g}°", "among alternatives", "ambiguous"]
     return note + "\n\n" + table([*head, "wrong", "no pose", "twins"], lines)
+
+
+def categories_section(results: Results) -> str:
+    """What the wrong poses look like, by the category of the shape; P1 and views together."""
+    sums: dict[str, dict[str, int]] = {}
+    for pool in ("P1", "views"):
+        for category, counts in results["categories"].get(pool, {}).items():
+            total = sums.setdefault(category, dict.fromkeys(counts, 0))
+            for name, count in counts.items():
+                total[name] += count
+    if not sums:
+        return ""
+    sums["**all**"] = {
+        name: sum(counts[name] for counts in sums.values()) for name in ("pairs", *KINDS, "sure")
+    }
+    lines = [
+        [
+            category,
+            str(counts["pairs"]),
+            f"{100 * (1 - counts['right'] / counts['pairs']):.1f}",
+            *(str(counts[kind]) for kind in KINDS[1:]),
+            str(counts["sure"]),
+        ]
+        for category, counts in sums.items()
+    ]
+    kinds = "; ".join(f"*{kind}*: {meaning}" for kind, meaning in MEANINGS.items())
+    note = (
+        "The same failures by the category of the shape and by what the wrong pose looks like, P1 "
+        f"and views together. A pair counts under the first that fits. {kinds}. *Sure*: wrong with "
+        f"a confidence above {SURE:g}."
+    )
+    return note + "\n\n" + table(["category", "pairs", "wrong %", *KINDS[1:], "sure"], lines)
 
 
 def time_table(results: Results) -> str:

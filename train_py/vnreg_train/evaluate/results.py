@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from vnreg_train.evaluate.bars import METHOD
+from vnreg_train.evaluate.failure_kinds import by_category
 from vnreg_train.evaluate.measures import confidence, measure, nees
 from vnreg_train.evaluate.pairs import split_shapes
 from vnreg_train.evaluate.rows import ROWS, Row
@@ -21,6 +22,7 @@ from vnreg_train.evaluate.symmetry import SymmetryGroup
 POOLS = {
     "P0": lambda row: row.protocol == "P0",
     "P1": lambda row: row.protocol == "P1",
+    "views": lambda row: row.protocol == "views",
     "all": lambda row: True,
 }
 
@@ -35,6 +37,7 @@ def collect_results(
     methods: dict[str, Any] = {}
     rows: dict[str, Any] = {}
     scored: dict[str, dict[Row, Scores]] = {}
+    categories: dict[Row, list[str]] = {}  # of the shapes of METHOD's pairs
     names = sorted(path.name for path in folder.iterdir() if path.is_dir())
     for row in ROWS.values():
         pairs = None
@@ -47,6 +50,8 @@ def collect_results(
             if methods[name] != found[0]:
                 raise ValueError(f"{name}: {row.name} was answered by another version of it")
             shapes = split_shapes(pairing.split, pairing.data) if name == METHOD else None
+            if shapes is not None:
+                categories[row] = [shapes.categories[shapes.label[pair.shape]] for pair in pairs]
             scores = score(pairs, found[1], groups, shapes)
             rows.setdefault(row.name, {})[name] = measure(scores)
             scored.setdefault(name, {})[row] = scores
@@ -57,6 +62,7 @@ def collect_results(
         "methods": methods,
         "rows": rows,
         "pooled": {name: pooled(of_row) for name, of_row in scored.items()},
+        "categories": categorised(scored.get(METHOD, {}), categories),
     }
 
 
@@ -81,6 +87,19 @@ def pooled(of_row: Mapping[Row, Scores]) -> dict[str, Any]:
             together = concatenated(parts)
             figures[pool] = {"confidence": confidence(together), "nees": nees(together)}
     return figures
+
+
+def categorised(
+    of_row: Mapping[Row, Scores], categories: Mapping[Row, Sequence[str]]
+) -> dict[str, Any]:
+    """Kinds of failure by category of the shape, over the rows of each pool but \"all\"."""
+    tables = {}
+    for pool, belongs in POOLS.items():
+        rows = [row for row in of_row if belongs(row)]
+        if rows and pool != "all":
+            names = [name for row in rows for name in categories[row]]
+            tables[pool] = by_category(concatenated([of_row[row] for row in rows]), names)
+    return tables
 
 
 def about(pairing: Pairing, groups: Mapping[str, SymmetryGroup]) -> dict[str, Any]:

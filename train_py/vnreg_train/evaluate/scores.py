@@ -30,6 +30,7 @@ class Scores:
     symmetric_rotation_deg: Float64  # to the nearest pose that is right up to symmetry
     symmetric_translation: Float64
     overlap: Float64  # the true one, of the pair
+    angle_deg: Float64  # of the true rotation
     same_crop: Int64  # 1: cropped towards the same side, 0: not, -1: does not apply
     symmetric_shape: Bools  # the shape has a group
     ms: Float64
@@ -102,6 +103,7 @@ def _one(
         *plain,
         *symmetric,
         pair.overlap,
+        float(rotation_error_deg(truth, np.eye(4))),
         -1 if pair.same_crop is None else int(pair.same_crop),
         not group.trivial,
         estimate.ms,
