@@ -55,4 +55,8 @@ def test_evaluate_prints_a_line_per_row_and_report_writes_the_page(
     assert "| clean | coarse | 100.0 (43.9–100.0) |" in text
     assert "(page/overlap.svg)" in text and "(page/results.json)" in text
     assert (page.parent / "page" / "overlap.svg").stat().st_size > 1000
-    assert (page.parent / "page" / "results.json").exists()
+    again = tmp_path / "again.md"
+    run("report", "--figures", str(page.parent / "page" / "results.json"), "--out", str(again))
+    assert again.read_text(encoding="utf-8") == text.replace("(page/", "(again/")
+    for plot in (page.parent / "page").glob("*.svg"):
+        assert (tmp_path / "again" / plot.name).read_bytes() == plot.read_bytes()

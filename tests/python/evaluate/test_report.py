@@ -177,3 +177,11 @@ def test_an_unfinished_run_has_a_page_too(
     results = collect_results(tmp_path, pairing, SHAPES)
     page = markdown(results, draw_plots(results, tmp_path / "plots"))
     assert "| density | 16.7" in page and "## Peers" in page
+
+
+def test_the_shipped_page_tells_the_shipped_figures() -> None:
+    docs = Path(__file__).resolve().parents[3] / "docs"
+    results = json.loads((docs / "results" / "results.json").read_text(encoding="utf-8"))
+    plots = [(caption, name) for caption, name, _ in PLOTS]
+    assert markdown(results, plots) == (docs / "results.md").read_text(encoding="utf-8")
+    assert all((docs / "results" / name).exists() for _, name in plots)

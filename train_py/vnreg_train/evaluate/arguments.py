@@ -53,11 +53,12 @@ TUNE_PEERS = Lesson(
 )
 REPORT = Lesson(
     summary="write the results of a run down: page, JSON and plots",
-    reads="The folder that `evaluate --run` filled.",
+    reads="The folder that `evaluate --run` filled; or a results.json of an earlier report.",
     writes="OUT, a page; beside it a folder of its name with results.json (every figure) and plots "
     "as SVG: recall against angle, overlap and noise, reliability, failures by category. The same "
     "answers give the same bytes.",
-    takes="A few minutes: the pairs are made again to tell the twins among the failures.",
+    takes="Half a minute of one core for all rows: the pairs are made again to tell the twins "
+    "among the failures. From a results.json 5 seconds.",
     example="report --run runs/evaluate --out docs/results.md",
 )
 
@@ -139,7 +140,9 @@ def _add_tune_peers(command: argparse.ArgumentParser) -> None:
 
 def _add_report(command: argparse.ArgumentParser) -> None:
     _add_pairing(command, "test", 0)
-    command.add_argument("--run", required=True, help="folder that `evaluate --run` filled")
+    origin = command.add_mutually_exclusive_group(required=True)
+    origin.add_argument("--run", help="folder that `evaluate --run` filled")
+    origin.add_argument("--figures", help="a results.json, to draw page and plots of it again")
     command.add_argument("--out", default="docs/results.md", help="the page; figures beside it")
     command.set_defaults(run_command=_report)
 

@@ -95,15 +95,20 @@ def tune_peers_main(arguments: argparse.Namespace) -> None:
 
 
 def report_main(arguments: argparse.Namespace) -> None:
-    """Writes the page --out, and beside it the folder of its name with the JSON and the plots."""
+    """Writes the page --out, and beside it the folder of its name with the JSON and the plots.
+
+    Page and plots are made of what the JSON holds: --figures makes them again from such a file.
+    """
     from vnreg_train.evaluate.plots import draw_plots
     from vnreg_train.evaluate.report import markdown
     from vnreg_train.evaluate.results import collect_results, write_results
 
-    pairing = Pairing(arguments.split, arguments.shapes, arguments.seed, Path(arguments.data))
-    results = collect_results(Path(arguments.run), pairing, read_symmetries())
     page = Path(arguments.out)
-    figures = page.with_suffix("")
-    write_results(results, figures / "results.json")
-    plots = draw_plots(results, figures)
-    page.write_text(markdown(results, plots, figures.name), encoding="utf-8")
+    folder = page.with_suffix("")
+    figures = Path(arguments.figures or folder / "results.json")
+    if arguments.run:
+        pairing = Pairing(arguments.split, arguments.shapes, arguments.seed, Path(arguments.data))
+        write_results(collect_results(Path(arguments.run), pairing, read_symmetries()), figures)
+    results = json.loads(figures.read_text(encoding="utf-8"))
+    plots = draw_plots(results, folder)
+    page.write_text(markdown(results, plots, folder.name), encoding="utf-8")

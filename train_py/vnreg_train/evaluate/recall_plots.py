@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from vnreg_train.data.protocol import ANGLES_DEG
 from vnreg_train.evaluate.bars import LIMIT, METHOD
-from vnreg_train.evaluate.measures import ANGLE_EDGES, wilson_lengths
+from vnreg_train.evaluate.measures import ANGLE_EDGES, OVERLAP_EDGES, wilson_lengths
 from vnreg_train.evaluate.rows import P1_FACTORS, PAPER_SETTINGS
 from vnreg_train.evaluate.titles import TITLES, plain_title
 
@@ -41,14 +41,14 @@ def against_angle(results: Results) -> Figure | None:
         rows = [(angle, f"P0/{setting}/{angle}") for angle in ANGLES_DEG]
         panels[f"P0 {setting}"] = _by_rows(results, rows, "plain")
     panels["P1, all rows"] = _by_bins(results, "P1/", "by_angle")
-    edges = (ANGLE_EDGES[0], ANGLE_EDGES[-1])
-    return _panels(panels, "largest Euler angle; P1: angle of the rotation, degrees", edges)
+    label = "largest Euler angle; P1: angle of the rotation, degrees"
+    return _panels(panels, label, (0.0, 195.0), ANGLE_EDGES)
 
 
 def against_overlap(results: Results) -> Figure | None:
     """In bins of the true overlap, the P1 partial rows together."""
     panels = {"P1, cropped clouds": _by_bins(results, "P1/partial", "by_overlap")}
-    return _panels(panels, "true overlap", (0.0, 1.0))
+    return _panels(panels, "true overlap", (0.0, 1.0), OVERLAP_EDGES)
 
 
 def against_noise(results: Results) -> Figure | None:
@@ -57,7 +57,8 @@ def against_noise(results: Results) -> Figure | None:
         "whole" if kept == 1 else f"{kept:.0%} kept": _by_rows(results, rows, "symmetric")
         for kept, rows in NOISE_ROWS.items()
     }
-    return _panels(panels, "noise, in longest sides of the shape", (-0.001, 0.021))
+    label = "noise, in longest sides of the shape"
+    return _panels(panels, label, (-0.0015, 0.0215), (0.0, 0.01, 0.02))
 
 
 def _by_rows(results: Results, rows: Sequence[tuple[float, str]], kind: str) -> dict[str, Line]:
@@ -92,7 +93,10 @@ def _counts(found: Mapping[str, Any]) -> Counts:
 
 
 def _panels(
-    panels: Mapping[str, Mapping[str, Line]], label: str, limits: tuple[float, float]
+    panels: Mapping[str, Mapping[str, Line]],
+    label: str,
+    limits: tuple[float, float],
+    ticks: Sequence[float],
 ) -> Figure | None:
     """Panels side by side that have any line, with one legend beside them."""
     drawn = {title: lines for title, lines in panels.items() if lines}
@@ -104,7 +108,7 @@ def _panels(
     figure, axes = plt.subplots(rows, columns, figsize=size, sharey=True, squeeze=False)
     for place, (title, lines) in zip(axes.flat, drawn.items(), strict=False):
         _draw_lines(place, lines, limits[1] - limits[0])
-        place.set(title=title, xlim=limits, ylim=(0, 102))
+        place.set(title=title, xlim=limits, xticks=ticks, ylim=(0, 102))
     for place in list(axes.flat)[len(drawn) :]:
         place.set_visible(False)
     for row in axes:
@@ -129,6 +133,7 @@ def _draw_lines(axes: Axes, lines: Mapping[str, Line], width: float) -> None:
             elinewidth=0.8,
             marker="o",
             markersize=3,
+            zorder=3 if method == METHOD else 2,
         )
 
 

@@ -34,5 +34,5 @@ def calibration(results: Mapping[str, Any]) -> Figure | None:
         label = f"{name}: ECE {figures['ece']:.3f}"
         axes.scatter(x, y, s=sizes, alpha=0.6, color=f"C{k}", label=label)
     axes.set(xlabel="confidence", ylabel="share of right poses", xlim=(0, 1.02), ylim=(0, 1.02))
-    axes.legend(loc="upper left")
+    axes.legend(loc="lower right")
     return figure
