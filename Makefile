@@ -16,7 +16,7 @@ SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python test-isa soak \
         check sanitize analyse valgrind stress fuzz fuzzers fuzz-builds fuzz-coverage \
-        bench bench-compare evaluate train train-paper data model docs wheel clean
+        bench bench-compare batch-kills evaluate train train-paper data model docs wheel clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -65,6 +65,9 @@ test-isa: setup ## the tests that run the engine, on every instruction set of th
 
 soak: build ## 100,000 aligns without growth; 1,000 frames at 30 Hz without a missed deadline
 	tests/consumers/soak.sh build/$(PRESET) $(abspath build/soak)
+
+batch-kills: python ## 10,000 pairs of vnreg.batch, its client killed three times and resumed
+	VNREG_BATCH_PAIRS=10000 $(PY) -m pytest -q tests/python/batch/test_batch_killed.py -k killed_client
 
 test-data: setup ## the test split of the furniture models, surfaces only
 	$(PY) -m vnreg_train.cli build-data --splits test --no-occupancy
@@ -134,6 +137,7 @@ $(VENV)/.peers: requirements/evaluate.txt $(VENV)/.installed
 evaluate: python data $(VENV)/.peers ## all modes and peers on the test split, into docs/results.md; resumes
 	$(PY) -m vnreg_train.cli evaluate --methods modes peers --run runs/evaluate --jobs 2
 	$(PY) -m vnreg_train.cli report --run runs/evaluate
+	$(PY) docs/page_tables.py
 
 $(VENV)/.bench: requirements/bench.txt $(VENV)/.peers
 	$(PY) -m pip install -q -r requirements/bench.txt
@@ -144,6 +148,7 @@ BENCH := PYTHONPATH=bench $(PY) -m vnreg_bench
 bench: python build $(VENV)/.bench ## times of kernels, engine, peers, runtimes, into docs/benchmark.md; BENCH_ARGS=--quick: minutes
 	$(PY) -m vnreg_train.cli build-data --splits validation --no-occupancy
 	$(BENCH) run --build build/$(PRESET) $(BENCH_ARGS)
+	$(PY) docs/page_tables.py
 
 bench-compare: python ## this tree's benchmarks beside those of BASE=<commit>; fails where one is slower
 	@test -n "$(BASE)" || { echo "usage: make bench-compare BASE=<commit>"; exit 2; }

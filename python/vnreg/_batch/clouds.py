@@ -19,8 +19,8 @@ from vnreg._vnreg import parse_cloud
 
 Points = NDArray[Any]
 
-READERS = 2
-"""Threads of a worker that read while it aligns."""
+READERS = 8
+"""Threads of a worker that read while it aligns: object stores answer after tens of ms."""
 PAIRS_AHEAD = 8
 """Pairs of a worker whose clouds are in memory, at most, and the one that it aligns."""
 CLOUDS_KEPT = 8

@@ -200,7 +200,9 @@ def compare_with_the_demo(block: Block, folder: Path) -> None:
         pytest.skip("the scans of `make demo` have not been fetched")
     program = ["--program", str(program_path()), "--out", str(folder), "--check"]
     printed = run(ROOT, sys.executable, ROOT / "examples/demo/demo.py", *program)
-    np.testing.assert_allclose(numbers(printed), numbers(block.text), atol=0.05)
+    np.testing.assert_allclose(numbers(printed), numbers(block.text), atol=0.02)
+    angles = [re.findall(r"rotation error ([\d.]+)", text)[0] for text in (printed, block.text)]
+    assert float(angles[0]) == pytest.approx(float(angles[1]), abs=0.5)
 
 
 RUN: dict[str, Callable[[Block, Path], None]] = {

@@ -66,6 +66,15 @@ def test_07_own_checkpoint(tmp_path: Path) -> None:
     assert vnreg.Model.load(tmp_path / "mine.vnr").name == "mine"
 
 
+def test_09_many_machines(tmp_path: Path) -> None:
+    script = EXAMPLES / "09_many_machines.py"
+    output = run(tmp_path, script, "--pairs", "12")
+    assert "done now: {'ok': 12, 'unreadable': 1}; parts done before: 0" in output
+    assert "sure of 12 of 13 pairs" in output
+    assert re.search(r"pair 12: .*mug_3.xyz: expected a file that can be read", output)
+    assert "parts done before: 2" in run(tmp_path, script, "--pairs", "12")
+
+
 @pytest.mark.parametrize("library", ["small_gicp", "open3d"])
 def test_08_icp_hand_over(library: str, tmp_path: Path) -> None:
     pytest.importorskip(library, reason="only `make evaluate` installs the peers")
