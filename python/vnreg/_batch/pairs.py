@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
 from typing import Any, NamedTuple, TypeAlias
 
 import fsspec
@@ -36,7 +37,7 @@ def read_pairs(pairs: Any, compute: Callable[[Any], Any]) -> Iterator[Pair]:
         rows = _table_rows(os.fspath(pairs))
     elif hasattr(pairs, "npartitions"):
         chosen = pairs[_chosen(pairs.columns)]
-        rows = _chain(_frame_rows(compute(part)) for part in chosen.partitions)
+        rows = chain.from_iterable(_frame_rows(compute(part)) for part in chosen.partitions)
     elif hasattr(pairs, "columns"):
         rows = _frame_rows(pairs)
     else:
@@ -57,14 +58,27 @@ def folder_of(pairs: Any) -> str:
 def _pair(number: int, row: Any) -> Pair:
     if isinstance(row, str) or len(row) not in (2, 3):
         raise ValueError(f"pairs[{number}]: expected a source, a target and perhaps an id")
-    name = row[2] if len(row) == 3 and not _is_missing(row[2]) else None
-    return Pair(_cloud(row[0]), _cloud(row[1]), None if name is None else str(name))
+    try:
+        return Pair(_cloud(row[0]), _cloud(row[1]), _text(row[2]) if len(row) == 3 else None)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"pairs[{number}]: expected paths or clouds: {error}") from None
 
 
 def _cloud(value: Any) -> Cloud:
-    if isinstance(value, str | os.PathLike):
+    if isinstance(value, str | bytes | os.PathLike):
         return os.fsdecode(value)
-    return None if _is_missing(value) else np.asarray(points_of(value))
+    if _is_missing(value):
+        return None
+    points = np.asarray(points_of(value))
+    if points.dtype == object:
+        raise TypeError(f"got {type(value).__name__}")
+    return points
+
+
+def _text(value: Any) -> str | None:
+    if isinstance(value, bytes):
+        return os.fsdecode(value)
+    return None if _is_missing(value) else str(value)
 
 
 def _is_missing(value: Any) -> bool:
@@ -85,12 +99,9 @@ def _frame_rows(frame: Any) -> Iterator[tuple[Any, ...]]:
 
 def _table_rows(url: str) -> Iterator[tuple[Any, ...]]:
     batches = _csv_batches(url) if re.search(r"\.csv(\.\w+)?$", url) else _parquet_batches(url)
-    return _chain(zip(*(c.to_pylist() for c in batch.columns), strict=True) for batch in batches)
-
-
-def _chain(groups: Iterable[Iterator[tuple[Any, ...]]]) -> Iterator[tuple[Any, ...]]:
-    for group in groups:
-        yield from group
+    return chain.from_iterable(
+        zip(*(c.to_pylist() for c in batch.columns), strict=True) for batch in batches
+    )
 
 
 def _parquet_batches(url: str) -> Iterator[pa.RecordBatch]:
@@ -111,9 +122,10 @@ def _by_number(path: str) -> list[tuple[int, str]]:
 
 
 def _csv_batches(url: str) -> Iterator[pa.RecordBatch]:
-    """With a header that names the columns; without one, the first two columns."""
+    """With a header that names the columns; without one, the first two columns. Values are bytes,
+    because the names of files need not be UTF-8."""
     with fsspec.open(url, "rb", compression="infer") as file:
-        header = file.readline().decode("utf-8-sig")
+        header = file.readline().decode("utf-8-sig", "replace")
     if not header:
         return
     names = [name.strip().strip('"') for name in header.strip().split(",")]
@@ -125,7 +137,7 @@ def _csv_batches(url: str) -> Iterator[pa.RecordBatch]:
             pyarrow.csv.ReadOptions(autogenerate_column_names=not has_header, use_threads=False),
             convert_options=pyarrow.csv.ConvertOptions(
                 include_columns=columns,
-                column_types=dict.fromkeys(columns, pa.string()),
+                column_types=dict.fromkeys(columns, pa.binary()),
                 null_values=[""],
                 strings_can_be_null=True,
             ),

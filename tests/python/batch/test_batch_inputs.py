@@ -151,9 +151,14 @@ def test_names_that_are_not_utf_8(client: Client, clouds: list[Path], tmp_path: 
     path = os.fsencode(tmp_path) + b"/caf\xe9.npy"
     with open(path, "wb") as file:
         file.write(clouds[0].read_bytes())
-    vnreg.batch([(os.fsdecode(path), clouds[1])], tmp_path / "out", address=client)
-    (row,) = results(tmp_path / "out").itertuples()
-    assert pd.isna(row.error) and row.source.endswith("caf\\xe9.npy")
+    (tmp_path / "pairs.csv").write_bytes(
+        b"\xef\xbb\xbfid,source,target\r\n\xe9,%s,%s\r\n" % (path, os.fsencode(clouds[1]))
+    )
+    listed = [(os.fsdecode(path), clouds[1], os.fsdecode(b"\xe9"))]
+    for number, pairs in enumerate((listed, tmp_path / "pairs.csv")):
+        vnreg.batch(pairs, tmp_path / f"out{number}", address=client)
+        (row,) = results(tmp_path / f"out{number}").itertuples()
+        assert pd.isna(row.error) and row.source.endswith("caf\\xe9.npy") and row.id == "\\xe9"
 
 
 def test_what_is_no_table_is_refused(client: Client, tmp_path: Path) -> None:
@@ -166,6 +171,9 @@ def test_what_is_no_table_is_refused(client: Client, tmp_path: Path) -> None:
     for row in ("ab", ("a",), ("a", "b", "c", "d")):
         with pytest.raises(ValueError, match=r"pairs\[0\]: expected a source, a target"):
             vnreg.batch([row], tmp_path / "c", address=client)
+    for cloud in ([[1.0, 2.0], [3.0]], object()):
+        with pytest.raises(ValueError, match=r"pairs\[1\]: expected paths or clouds"):
+            vnreg.batch([("a", "b"), ("a", cloud)], tmp_path / "c", address=client)
     with pytest.raises(FileNotFoundError):
         vnreg.batch(tmp_path / "none.csv", tmp_path / "d", address=client)
 
