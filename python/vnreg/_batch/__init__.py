@@ -53,7 +53,8 @@ def batch(
     tables are read as the work goes on, never as a whole.
     output: folder, path or URL. Its files part-NUMBER-HASH.parquet hold `part_rows` rows each, in
     the order of the pairs, and appear complete or not at all. Called again after it was killed,
-    batch does what is missing. It refuses a folder of other pairs or other settings (ValueError).
+    batch does what is missing, rows appended to the pairs included. It refuses a folder of other
+    pairs or other settings (ValueError).
 
     address: of a Dask scheduler, or a Client; None starts `workers` processes here (default: one
     per core), for the time of the call.

@@ -18,6 +18,9 @@ import pyarrow as pa
 import pyarrow.parquet
 from fsspec.implementations.local import LocalFileSystem
 
+from vnreg._batch.blocks import Block
+from vnreg._batch.rows import NAMES, named
+
 SETTINGS = "_vnreg.json"
 """What the parts were made with. Readers of parquet folders skip names that begin with _ or ."""
 PART = re.compile(r"part-(\d+)-[0-9a-f]+\.parquet")
@@ -57,12 +60,24 @@ class OutputFolder:
         pyarrow.parquet.write_table(table, content, compression="zstd")
         self._put(name, content.getvalue())
 
+    def begins(self, name: str, block: Block) -> bool:
+        """Whether a part has the first pairs of a block of paths, and fewer than the block."""
+        files, path = self._files()
+        names = [named(block.first_row + i, pair) for i, pair in enumerate(block.pairs)]
+        content = BytesIO(files.cat_file(f"{path}/{name}"))
+        found = pyarrow.parquet.read_table(content, columns=NAMES).to_pylist()
+        of_paths = all(row["source"] and row["target"] for row in found)
+        return of_paths and len(found) < len(names) and found == names[: len(found)]
+
+    def remove(self, name: str) -> None:
+        files, path = self._files()
+        files.rm_file(f"{path}/{name}")
+
     def remove_leftovers(self) -> None:
         """What killed workers have begun to write."""
-        files, path = self._files()
         for name in filter(TEMPORARY.fullmatch, self._names()):
             with suppress(FileNotFoundError):
-                files.rm_file(f"{path}/{name}")
+                self.remove(name)
 
     def _put(self, name: str, content: bytes) -> None:
         files, path = self._files()

@@ -14,6 +14,7 @@ from vnreg._batch.pairs import Cloud, Pair
 
 Row = dict[str, Any]
 
+NAMES = ["row", "id", "source", "target"]
 SCHEMA = pa.schema(
     [
         pa.field("row", pa.int64(), nullable=False),
@@ -37,7 +38,7 @@ SCHEMA = pa.schema(
 
 def failed_row(number: int, pair: Pair, status: str, error: str) -> Row:
     """The row of a pair that the engine has not seen."""
-    return _named(number, pair) | {
+    return named(number, pair) | {
         "status": status,
         "points_source": 0,
         "points_target": 0,
@@ -46,7 +47,7 @@ def failed_row(number: int, pair: Pair, status: str, error: str) -> Row:
 
 
 def result_row(number: int, pair: Pair, result: vnreg.Result, error: str | None) -> Row:
-    row = _named(number, pair) | {
+    row = named(number, pair) | {
         "status": result.status,
         "points_source": result.points_source,
         "points_target": result.points_target,
@@ -74,7 +75,8 @@ def one_line(text: str) -> str:
     return "".join(c if c >= " " and c != "\x7f" else f"\\x{ord(c):02x}" for c in readable)
 
 
-def _named(number: int, pair: Pair) -> Row:
+def named(number: int, pair: Pair) -> Row:
+    """The columns that say which pair it is."""
     return {
         "row": number,
         "id": str(number) if pair.id is None else one_line(pair.id),

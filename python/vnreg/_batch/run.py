@@ -141,6 +141,9 @@ def _missing(blocks: Iterable[Block], folder: OutputFolder, report: BatchReport)
             yield block
         elif found == block.file_name:
             report.resumed_parts += 1
+        elif not parts and folder.begins(found, block):  # the last part, and rows were appended
+            folder.remove(found)
+            yield block
         else:
             raise ValueError(f"{folder.url}: {found} is of other pairs than those given now")
     if parts:

@@ -123,6 +123,21 @@ def test_an_output_of_other_pairs_or_settings_is_refused(
     assert_same_rows(before, results(output))
 
 
+def test_appended_pairs_are_done(client: Client, clouds: list[Path], tmp_path: Path) -> None:
+    """The last part, which was short, is made anew; the others stay."""
+    pairs = pairs_of(clouds, 11)
+    for count, parts in ((5, 3), (9, 3), (11, 2), (11, 0)):
+        report = vnreg.batch(pairs[:count], tmp_path, address=client, part_rows=2)
+        assert report.parts == parts
+        assert_as_align(results(tmp_path), pairs[:count])
+    for changed in ([*pairs[:10], pairs[0]], [*pairs[:10], pairs[0], pairs[1]], pairs[:10]):
+        with pytest.raises(ValueError, match="other pairs|parts more"):
+            vnreg.batch(changed, tmp_path, address=client, part_rows=2)
+    vnreg.batch(pairs[:1], tmp_path / "one", address=client)
+    with pytest.raises(ValueError, match="other pairs"):
+        vnreg.batch([], tmp_path / "one", address=client)
+
+
 def test_nothing_is_started_for_a_bad_model_or_option(clouds: list[Path], tmp_path: Path) -> None:
     """Errors come at once, and no folder appears."""
     pairs, output = pairs_of(clouds, 1), tmp_path / "out"
