@@ -8,6 +8,7 @@
 #include "cloud_file/cloud_file.hpp"
 #include "cloud_file/ply_writer.hpp"
 #include "cloud_file/text_scan.hpp"
+#include "html_view.hpp"
 #include "rotation.hpp"
 
 namespace vnreg::cli {
@@ -126,6 +127,10 @@ CLI::App* add_align_command(CLI::App& app, AlignArguments& arguments) {
                    "Write the moved source (all of its points) to this PLY file")
       ->check(CLI::Validator(check_ply_name, ""))
       ->type_name("FILE.ply");
+  command
+      ->add_option("--html", arguments.html,
+                   "Write a page that shows the clouds in 3D to this file; it needs no network")
+      ->type_name("FILE.html");
   command->add_option("--model", arguments.model, "Model file; default: the built-in model")
       ->type_name("FILE");
   command
@@ -172,6 +177,12 @@ Outcome run_align(const AlignArguments& arguments) {
                   model.min_points());
   }
   if (!arguments.output.empty()) write_moved(arguments.output, source, result.T_target_source);
+  if (!arguments.html.empty()) {
+    const Explanation explanation = registrar.explain();
+    write_html_view(arguments.html,
+                    {source, target, arguments.source, arguments.target, result, &explanation,
+                     model.name(), to_string(arguments.options.mode)});
+  }
   const AlignReport report{result, model.name(), arguments.options.mode, middle_of(source)};
   return {result.status == Status::ok ? ExitCode::ok : ExitCode::not_sure,
           arguments.json ? to_json(report) : to_text(report)};

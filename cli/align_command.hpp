@@ -13,6 +13,7 @@ struct AlignArguments {
   std::string source;
   std::string target;
   std::string output;  // empty: the moved source is not written
+  std::string html;    // empty: no page is written
   std::string model;   // empty: the built-in model
   bool json = false;
   Options options;
@@ -21,7 +22,8 @@ struct AlignArguments {
 /// Declares the command; the parse fills `arguments`.
 CLI::App* add_align_command(CLI::App& app, AlignArguments& arguments);
 
-/// Reads, aligns, writes the moved source if asked to. Throws CommandError or CloudFileError.
+/// Reads, aligns, writes the moved source and the page if asked to. Throws CommandError or
+/// CloudFileError.
 Outcome run_align(const AlignArguments& arguments);
 
 }  // namespace vnreg::cli

@@ -139,6 +139,7 @@ RigidTransform register_fine(const ModelData& model, const RigidTransform& coars
     pose = kernels::compose(fine_step(fine), pose);
     record_step(iteration, pose, w);
   }
+  w.reached.matched = !w.deadline.expired();
   return pose;
 }
 

@@ -419,6 +419,7 @@ Index propose_from_matches(Workspace& w) noexcept {
   select_matches(source, target, w.threads, b);
   gather_places(source, target, b);
   if (w.deadline.passed()) return 0;
+  w.reached.matched = true;
   measure_agreement(w.threads, b);
   if (w.deadline.passed()) return 0;
   return write_motions(select_seeds(b), w);

@@ -11,6 +11,7 @@
 #include "engine/covariance.hpp"
 #include "engine/descriptor_encoder.hpp"
 #include "engine/encoder.hpp"
+#include "engine/explain.hpp"
 #include "engine/fine.hpp"
 #include "engine/model_data.hpp"
 #include "engine/neighbourhood.hpp"
@@ -18,6 +19,7 @@
 #include "engine/prepared_cloud.hpp"
 #include "engine/residual.hpp"
 #include "engine/stopwatch.hpp"
+#include "engine/user_pose.hpp"
 #include "engine/verified.hpp"
 #include "engine/workspace.hpp"
 #include "vnreg/vnreg.hpp"
@@ -138,18 +140,6 @@ void encode(const ModelData& model, const Options& options, Workspace& w) noexce
   }
 }
 
-/// t_user = c_target + s t - R c_source.
-Pose user_pose(const RigidTransform& network, double scale, const Cloud cloud[2]) noexcept {
-  const Eigen::Vector3d source = Eigen::Map<const Eigen::Vector3d>(cloud[0].centroid);
-  const Eigen::Vector3d target = Eigen::Map<const Eigen::Vector3d>(cloud[1].centroid);
-  Eigen::Matrix<double, 4, 4, Eigen::RowMajor> matrix = decltype(matrix)::Identity();
-  matrix.topLeftCorner<3, 3>() = network.rotation;
-  matrix.topRightCorner<3, 1>() = target + scale * network.translation - network.rotation * source;
-  Pose pose;
-  Eigen::Map<decltype(matrix)>(pose.data()) = matrix;
-  return pose;
-}
-
 bool finite(const Pose& pose) noexcept {
   return Eigen::Map<const Eigen::Matrix<double, 16, 1>>(pose.data()).allFinite();
 }
@@ -209,6 +199,8 @@ Status run(const ModelData& model, const Options& options, const Input inputs[2]
   }
   result.ms.encode = watch.lap();
   if (w.deadline.expired()) return unfinished(w.deadline);
+  w.reached.scale = scale;
+  w.reached.described = model.descriptor_model.has_value();
   const CoarsePose coarse = register_coarse(model, w);
   result.ms.coarse = watch.lap();
   // A symmetric cloud may leave the features without a rotation, but not its points.
@@ -219,6 +211,7 @@ Status run(const ModelData& model, const Options& options, const Input inputs[2]
   RigidTransform transform = coarse_transform;
   if (w.local && coarse.determined) {
     encode_local(model, w);
+    w.reached.described = !w.deadline.expired();
     result.ms.encode += watch.lap();
     transform = register_fine(model, coarse.transform, w);
     result.ms.fine = watch.lap();
@@ -293,15 +286,18 @@ Input RegistrarState::input(const CloudRef& cloud) const noexcept {
 const Result& RegistrarState::align(const CloudRef& source, const CloudRef& target) noexcept {
   Stopwatch watch;
   result = Result{};
+  workspace.reached = {};
   workspace.deadline.start(options);
   workspace.recorder.clear();
   const Input inputs[2] = {input(source), input(target)};
   result.status = run(model.data(), options, inputs, workspace, result);
+  workspace.reached.answered = true;
   result.ms.total = watch.lap();
   return result;
 }
 
 std::shared_ptr<const PreparedData> RegistrarState::prepare(const PointsView& points) {
+  workspace.reached = {};
   workspace.deadline.start(options);
   auto prepared = std::make_shared<PreparedData>(model, options, max_points);
   prepared->status = run_alone(model.data(), options, points, workspace);
@@ -329,6 +325,10 @@ PreparedCloud Registrar::prepare(PointsView cloud) { return PreparedCloud(state_
 
 const std::vector<Stage>& Registrar::stages() const noexcept {
   return state_->workspace.recorder.stages();
+}
+
+Explanation Registrar::explain() const {
+  return detail::explain(state_->workspace, state_->result);
 }
 
 }  // namespace vnreg

@@ -284,6 +284,8 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
     result.judged = judge_poses(poses, count, w);
   }
   record_judgement(fits, count, w);
+  std::copy_n(poses, count, v.considered);
+  w.reached.considered = count;
   count =
       keep_distinct(poses, count, VerifiedPoses::capacity, alternative_degrees, alternative_radii);
   const double least =

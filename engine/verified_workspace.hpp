@@ -60,8 +60,9 @@ struct VerifiedWorkspace {
   JudgeWorkspace judge;  // empty without descriptors
   /// kept_per_chunk of each chunk, and behind those that are found, those from matches.
   std::vector<Hypothesis> hypotheses;
-  std::vector<Index> kept;        // how many of them each chunk has found
-  std::vector<ScoredPose> poses;  // what is refined, behind what has been
+  std::vector<Index> kept;             // how many of them each chunk has found
+  std::vector<ScoredPose> poses;       // what is refined, behind what has been
+  ScoredPose considered[final_poses];  // between which was decided last
 
   VerifiedWorkspace() = default;
   /// `encoded`: how many points of a cloud have descriptors, at most; 0 if the model makes none.

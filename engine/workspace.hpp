@@ -76,10 +76,20 @@ struct ThreadScratch {
   kernels::PairScratch pairs;
 };
 
+/// How far the last align came: what of the memory below is that call's own (engine/explain.hpp).
+struct Reached {
+  double scale = 1;        // the length that is 1 in network coordinates
+  bool described = false;  // significances of both clouds
+  bool matched = false;    // matches
+  Index considered = 0;    // poses in verified.considered
+  bool answered = false;   // the result
+};
+
 struct Workspace {
   Workspace(const ModelData& model, const Options& options, Index max_points);
 
   Deadline deadline;  // of the running call
+  Reached reached;
   Threads threads;
   /// The clouds whose points and features the running call computes; the others were prepared.
   Sides sides = both_sides;

@@ -12,5 +12,7 @@ void bind_model(nanobind::module_& module);
 void bind_result(nanobind::module_& module);
 /// Registrar, PreparedCloud, Cancellation, align and align_many.
 void bind_registrar(nanobind::module_& module);
+/// Explanation, and the viewer's page.
+void bind_viewer(nanobind::module_& module);
 
 }  // namespace vnreg::python

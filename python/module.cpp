@@ -18,5 +18,6 @@ NB_MODULE(_vnreg, module) {
   vnreg::python::bind_cloud_file(module);
   vnreg::python::bind_model(module);
   vnreg::python::bind_result(module);
+  vnreg::python::bind_viewer(module);
   vnreg::python::bind_registrar(module);
 }

@@ -93,6 +93,12 @@ class SharedRegistrar {
     return registrar_.stages();
   }
 
+  Explanation explain() {
+    const nb::gil_scoped_release unlocked;
+    const std::lock_guard lock(mutex_);
+    return registrar_.explain();
+  }
+
  private:
   std::mutex mutex_;
   Registrar registrar_;
@@ -222,6 +228,10 @@ void bind_registrar_class(nb::module_& module) {
            "array; what is wrong with the points themselves is told by the result's status.")
       .def("prepare", &SharedRegistrar::prepare, "cloud"_a.none(),
            "A PreparedCloud: what align would do for this cloud each time is done once.")
+      .def(
+          "explain", &SharedRegistrar::explain,
+          "What the last align went by, an Explanation: described points, matches, hypotheses;\n"
+          "empty before the first one and after prepare(). It costs nothing until it is asked for.")
       .def("stages", &stage_arrays,
            "What the last align computed: {name: array}, float64 (indices int64), names and\n"
            "shapes as in docs/design.md; empty unless record_stages was set.");

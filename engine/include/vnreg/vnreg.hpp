@@ -220,6 +220,31 @@ struct Stage {
   std::vector<double> values;      ///< row-major
 };
 
+/// What an answer was found by, for people to look at: see Registrar::explain().
+struct Explanation {
+  /// A point that the network described.
+  struct Point {
+    std::array<double, 3> position{};  ///< in its cloud's frame and units
+    double significance = 0;  ///< 0 to 1: how much the network expects of the point's best match
+  };
+  /// A point of the source and the point of the target that it was taken for.
+  struct Match {
+    std::uint32_t source = 0;  ///< index into Explanation::source
+    std::uint32_t target = 0;  ///< index into Explanation::target
+    double weight = 0;         ///< at least 0; the larger, the more it counts
+  };
+
+  std::vector<Point> source, target;
+  /// Those that proposed poses, the heaviest first. Architecture `vnreg`: at most 256, the weight
+  /// is the probability of the match by dual softmax, times both significances. Architecture
+  /// `paper`: of the fine register's last iteration, the weights add up to 1.
+  std::vector<Match> matches;
+  /// Mode verified: the poses (at most 12) between which was decided, the best first, with the
+  /// scores of that decision; the result's pose and alternatives are among them. Else the result's
+  /// pose, in mode paper followed by the coarse one; scores are NaN.
+  std::vector<Alternative> hypotheses;
+};
+
 namespace detail {
 struct ModelData;
 struct PreparedData;
@@ -328,6 +353,11 @@ class VNREG_API Registrar {
 
   /// What the last align computed, in the order of computation; empty unless record_stages is set.
   const std::vector<Stage>& stages() const noexcept;
+
+  /// What the last align went by, as far as it came; empty before the first one and after
+  /// prepare(). Made from working memory when it is asked for, so align itself is as fast as ever.
+  /// Throws std::bad_alloc only.
+  Explanation explain() const;
 
  private:
   std::unique_ptr<detail::RegistrarState> state_;

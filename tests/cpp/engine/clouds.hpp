@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <numbers>
 #include <random>
@@ -38,6 +39,26 @@ inline Points shape(std::size_t count, Random& random) {
     const double bump = 1 + 0.4 * v.x() * v.y() + 0.3 * v.z() * v.z() * v.z() + 0.2 * v.x();
     p = {0.5 * bump * v.x(), 0.35 * bump * v.y(), 0.25 * bump * v.z()};
   }
+  return points;
+}
+
+/// On the surface of a box about the origin, sides 1, 0.7 and 0.4. Half a turn about any axis maps
+/// the points onto themselves.
+inline Points box(std::size_t quarter, Random& random) {
+  const double half[3] = {0.5, 0.35, 0.2};
+  std::discrete_distribution<std::size_t> face({0.28, 0.4, 0.7});  // areas, by normal
+  Points points;
+  for (std::size_t i = 0; i < quarter; ++i) {
+    std::array<double, 3> p;
+    for (std::size_t axis = 0; axis < 3; ++axis) p[axis] = random.uniform(-half[axis], half[axis]);
+    const std::size_t normal = face(random.engine());
+    p[normal] = p[normal] > 0 ? half[normal] : -half[normal];
+    points.push_back(p);
+    points.push_back({p[0], -p[1], -p[2]});
+    points.push_back({-p[0], p[1], -p[2]});
+    points.push_back({-p[0], -p[1], p[2]});
+  }
+  std::shuffle(points.begin(), points.end(), random.engine());
   return points;
 }
 

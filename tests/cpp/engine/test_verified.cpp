@@ -29,26 +29,6 @@ Points noisy(Points points, double deviation, Random& random) {
   return points;
 }
 
-/// On the surface of a box about the origin, sides 1, 0.7 and 0.4. Half a turn about any axis maps
-/// the points onto themselves.
-Points box(std::size_t quarter, Random& random) {
-  const double half[3] = {0.5, 0.35, 0.2};
-  std::discrete_distribution<std::size_t> face({0.28, 0.4, 0.7});  // areas, by normal
-  Points points;
-  for (std::size_t i = 0; i < quarter; ++i) {
-    std::array<double, 3> p;
-    for (std::size_t axis = 0; axis < 3; ++axis) p[axis] = random.uniform(-half[axis], half[axis]);
-    const std::size_t normal = face(random.engine());
-    p[normal] = p[normal] > 0 ? half[normal] : -half[normal];
-    points.push_back(p);
-    points.push_back({p[0], -p[1], -p[2]});
-    points.push_back({-p[0], p[1], -p[2]});
-    points.push_back({-p[0], -p[1], p[2]});
-  }
-  std::shuffle(points.begin(), points.end(), random.engine());
-  return points;
-}
-
 void require_near(const Pose& pose, const Eigen::Isometry3d& truth) {
   const Eigen::Isometry3d got = motion_of(pose);
   REQUIRE(rotation_error_deg(got, truth) < 5);
