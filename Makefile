@@ -1,5 +1,5 @@
 # The front door. Each target installs what it needs; nothing has to be set up before.
-#   make demo      align two real scans, print the pose, draw before and after
+#   make demo      align two real scans, print the pose, make the page that shows them in 3D
 #   make test      all tests, C++ and Python
 #   make help      the rest
 SHELL := /bin/bash
@@ -10,11 +10,14 @@ CLI := build/$(PRESET)/vnreg
 DEBIAN := cmake ninja-build ccache g++ libeigen3-dev catch2 libcli11-dev nlohmann-json3-dev \
           libbenchmark-dev python3-dev python3-venv doxygen
 FUZZ_DEBIAN := clang-14 libclang-rt-14-dev libomp-14-dev llvm-14
+# The viewer's tests: a browser, a font for it, and what joins the page's script.
+VIEWER_DEBIAN := chromium fonts-dejavu-core esbuild
 # What the wheel of Open3D, a peer of `make evaluate`, links with.
 PEERS_DEBIAN := libusb-1.0-0 libgl1 libegl1 libidn2-0
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python test-isa soak \
+        viewer viewer-three viewer-picture \
         check sanitize analyse valgrind stress fuzz fuzzers fuzz-builds fuzz-coverage \
         bench bench-compare batch-kills evaluate train train-paper data model docs wheel clean
 
@@ -47,7 +50,7 @@ build: debian-packages ## the library and the program, at build/release/vnreg
 python: setup ## the Python module `vnreg`, into .venv
 	$(PY) -m pip install -q --no-build-isolation .
 
-demo: python build ## align two real scans, print the pose, draw before and after
+demo: python build ## align two real scans, print the pose, make the page that shows them in 3D
 	$(PY) examples/demo/demo.py --check
 
 test: test-cpp test-python ## all tests
@@ -56,6 +59,7 @@ test-cpp: build
 	ctest --preset $(PRESET) -j2
 
 test-python: python build test-data
+	$(call install_debian,$(VIEWER_DEBIAN))
 	$(PY) -m pytest -q tests/python
 
 test-isa: setup ## the tests that run the engine, on every instruction set of this processor
@@ -72,9 +76,21 @@ batch-kills: python ## 10,000 pairs of vnreg.batch, its client killed three time
 test-data: setup ## the test split of the furniture models, surfaces only
 	$(PY) -m vnreg_train.cli build-data --splits test --no-occupancy
 
+viewer: ## viewer/view.js, the script of the viewer's page, from viewer/src
+	$(call install_debian,esbuild)
+	viewer/make_view.sh
+
+viewer-three: ## viewer/three.js from the npm package `three`; needs npm
+	$(call install_debian,esbuild)
+	viewer/make_three.sh
+
+viewer-picture: demo ## docs/viewer.webp, the demo's pair as the viewer shows it
+	$(call install_debian,$(VIEWER_DEBIAN))
+	$(PY) viewer/take_picture.py build/demo/aligned_turned.html docs/viewer.webp
+
 check: setup ## formatting, lints, types
-	$(PY) -m ruff check train_py python tests/python tests/soak bench examples docs
-	$(PY) -m ruff format --check train_py python tests/python tests/soak bench examples docs
+	$(PY) -m ruff check train_py python tests/python tests/soak bench examples docs viewer
+	$(PY) -m ruff format --check train_py python tests/python tests/soak bench examples docs viewer
 	$(PY) -m mypy train_py/vnreg_train python/vnreg/_batch
 
 sanitize: debian-packages ## the C++ tests under address and undefined-behaviour sanitizers
@@ -85,7 +101,7 @@ sanitize: debian-packages ## the C++ tests under address and undefined-behaviour
 analyse: debian-packages ## static analysis of the C++ code by cppcheck
 	$(call install_debian,cppcheck)
 	cppcheck --quiet --std=c++20 --language=c++ --enable=warning,performance,portability --inline-suppr \
-	  --suppressions-list=.cppcheck -I. -Iengine/include -Icli --error-exitcode=1 model_format cli kernels engine fuzz
+	  --suppressions-list=.cppcheck -I. -Iengine/include -Icli --error-exitcode=1 model_format cli kernels engine viewer fuzz
 
 # One pair from files to pose, with the least instructions, which valgrind knows.
 valgrind: debian-packages ## one pair end to end under valgrind, leaks included

@@ -11,6 +11,7 @@ import json
 import math
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +26,25 @@ LIMIT_DEG = 5.0
 
 
 def align(program: Path, source: Path, target: Path, out: Path, mode: str) -> dict[str, Any]:
-    """The program's JSON report; SystemExit with its message if it fails."""
+    """The program's JSON report; SystemExit with its message if it fails.
+
+    It writes the moved source to `out`, and the page that shows the pair beside it.
+    """
     command = [program, "align", source, target, "--json", "--mode", mode, "-o", out]
+    command += ["--html", page_of(out)]
+    begin = time.perf_counter()
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+    seconds = time.perf_counter() - begin
     if done.returncode not in (0, 4):
         sys.exit(done.stderr.strip())
+    print(f"\n{' '.join(map(str, command))}\n{seconds:.2f} s, files and page included")
     report: dict[str, Any] = json.loads(done.stdout)
     return report
+
+
+def page_of(aligned: Path) -> Path:
+    """Where the page goes that shows the alignment."""
+    return aligned.with_suffix(".html")
 
 
 def rotation_between_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
@@ -41,7 +54,7 @@ def rotation_between_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> floa
 
 
 def print_report(title: str, report: dict[str, Any]) -> None:
-    print(f"\n{title}: {report['status']}, mode {report['mode']}, model {report['model']}")
+    print(f"{title}: {report['status']}, mode {report['mode']}, model {report['model']}")
     print("T_target_source")
     for row in report["T_target_source"]:
         print("  " + "  ".join(f"{value:10.6f}" for value in row))
@@ -92,6 +105,7 @@ def main() -> None:
         caption = f"{report['ms']['total']:.0f} ms, overlap {report['overlap']:.0%}"
         draw(*clouds, f"vnreg align, mode {report['mode']}: {caption}", picture)
         print(f"picture: {picture}")
+        print(f"in 3D, open in a browser: {page_of(aligned)}")
     if arguments.check and max(errors) > LIMIT_DEG:
         sys.exit(f"rotation error above {LIMIT_DEG} degrees: {max(errors):.2f}")
 

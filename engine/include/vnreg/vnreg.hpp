@@ -234,7 +234,8 @@ struct Explanation {
     double weight = 0;         ///< at least 0; the larger, the more it counts
   };
 
-  std::vector<Point> source, target;
+  std::vector<Point> source;  ///< of architecture `paper` all that were used, else the encoded ones
+  std::vector<Point> target;  ///< likewise
   /// Those that proposed poses, the heaviest first. Architecture `vnreg`: at most 256, the weight
   /// is the probability of the match by dual softmax, times both significances. Architecture
   /// `paper`: of the fine register's last iteration, the weights add up to 1.

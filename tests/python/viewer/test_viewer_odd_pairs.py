@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from processor_use import OtherPrograms
 from viewer_pictures import Opened, drawn, picture, state
 
 import vnreg
@@ -77,6 +78,31 @@ def test_empty_clouds(open_page: Opened, mug: Pair, tmp_path: Path) -> None:
     page = open_page(vnreg.view(nothing, mug[1]).save(tmp_path / "one.html"))
     assert drawn(picture(page)).sum() > 100
     open_page(vnreg.view(nothing, np.full((3, 3), np.nan)).save(tmp_path / "none.html"))
+
+
+def test_an_ambiguous_shape(open_page: Opened, tmp_path: Path) -> None:
+    """A box: half a turn changes nothing, and the page offers those poses."""
+    random = np.random.default_rng(5)
+    half = np.array([0.5, 0.35, 0.2])
+    clouds = []
+    for _ in range(2):
+        points = random.uniform(-1, 1, (250, 3))
+        side = np.arange(250), random.choice(3, size=250, p=[0.2, 0.3, 0.5])
+        points[side] = np.sign(points[side])
+        turns = ([1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1])
+        clouds.append(np.concatenate([half * points * turn for turn in turns]))
+    result = vnreg.align(*clouds)
+    assert result.status == "ambiguous"
+    page = open_page(
+        vnreg.view(*clouds, result).save(tmp_path / "view.html"), reduced_motion="reduce"
+    )
+    assert page.locator("#status").inner_text() == "ambiguous"
+    kinds = page.locator(".pose .kind").all_inner_texts()
+    assert kinds[0] == "answer" and kinds.count("alternative") == len(result.alternatives) > 0
+    page.locator(".pose").nth(kinds.index("alternative")).click()
+    m = np.array(state(page)["sourceMatrix"]).reshape(4, 4).T[:3, :3]
+    other = result.alternatives[0].T_target_source[:3, :3]
+    np.testing.assert_allclose(m / np.cbrt(np.linalg.det(m)), other, atol=1e-6)
 
 
 def test_no_matches(open_page: Opened, mug: Pair, tmp_path: Path) -> None:
@@ -166,14 +192,19 @@ ORBIT = """seconds => new Promise(resolve => {
 def test_large_pairs_orbit_fluently(open_page: Opened, tmp_path: Path) -> None:
     """Two clouds of 100,000 points, software rendering: 30 frames per second or more.
 
-    While the view moves, as many points are drawn as this machine can; then all. Other work on the
-    machine may disturb a second, so the best of some counts.
+    While the view moves, as many points are drawn as this machine can; then all. The best of some
+    tries counts, because other programs disturb them; it is skipped where they always do.
     """
     page = open_page(vnreg.view(*large_pair(100_000)).save(tmp_path / "view.html"))
     full = drawn(picture(page)).sum()
-    rates: list[tuple[float, float]] = []
-    while len(rates) < 12 and not any(rate >= 30 for rate, _ in rates):
-        rates.append(tuple(page.evaluate(ORBIT, 1.5)))
-    print("frames per second, share of the points:", rates)
-    assert max(rate for rate, _ in rates) >= 30, rates
-    assert drawn(picture(page)).sum() > 0.5 * full  # all are back
+    tries = []
+    while len(tries) < 10 and not any(rate >= 30 for rate, _, _ in tries):
+        with OtherPrograms() as others:
+            rate, share = page.evaluate(ORBIT, 1.5)
+        tries.append((rate, share, others.processors))
+    print("frames per second, share of the points, processors that others used:", tries)
+    assert drawn(picture(page)).sum() > 0.9 * full  # all are back
+    best = max(rate for rate, _, _ in tries)
+    if best < 30 and min(busy for _, _, busy in tries) > 0.3:
+        pytest.skip(f"other programs kept the processors busy: {tries}")
+    assert best >= 30, tries
