@@ -1,7 +1,7 @@
 """`vnreg-train`: build the data, train networks and the judge, export, evaluate.
 
 The way from nothing to a model of your own: build-data, train, export, train-judge, calibrate,
-golden, inspect. The way to figures: evaluate, report. Every command has its --help.
+golden, inspect. The way to figures: evaluate, report, gallery. Every command has its --help.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ COMMANDS = commands()
 
 
 def test_the_commands_of_the_way_to_a_model_are_there() -> None:
-    assert {"build-data", "train", "evaluate", "export", "inspect"} <= set(COMMANDS)
+    assert {"build-data", "train", "evaluate", "export", "inspect", "gallery"} <= set(COMMANDS)
     root = parser().format_help()
     assert all(f"    {name}" in root for name in COMMANDS)
 

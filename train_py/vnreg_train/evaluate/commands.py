@@ -94,6 +94,30 @@ def tune_peers_main(arguments: argparse.Namespace) -> None:
     tune_peers(arguments.peers or list(PEERS), pairing, read_symmetries(), TUNED)
 
 
+def gallery_main(arguments: argparse.Namespace) -> None:
+    """Writes the page --out; says how many pairs it has and how large it is."""
+    import vnreg
+    from vnreg_train.evaluate.gallery import gallery_page, make_card
+    from vnreg_train.evaluate.worst_pairs import worst_pairs
+
+    rows = select_rows(arguments.rows)
+    mode, run, data = arguments.mode, Path(arguments.run), Path(arguments.data)
+    groups = read_symmetries(SYMMETRIES) if SYMMETRIES.exists() else {}
+    wrong = worst_pairs(run, mode, rows, data, groups, arguments.count, arguments.order)
+    model = vnreg.Model.load(arguments.model) if arguments.model else vnreg.Model.builtin()
+    registrar = vnreg.Registrar(model, mode=mode, threads=1)
+    cards = [make_card(answer, registrar, model.name, mode) for answer in wrong]
+    first = {"confidence": "the surest mistakes first", "error": "the farthest off first"}
+    note = (
+        f"{len(cards)} wrong answers of mode {mode}, model {model.name}, in "
+        f"{' '.join(arguments.rows)} of {run.name}; {first[arguments.order]}."
+    )
+    page = Path(arguments.out)
+    page.parent.mkdir(parents=True, exist_ok=True)
+    page.write_text(gallery_page(cards, "The worst pairs", note), encoding="utf-8")
+    print(f"{page}: {len(cards)} pairs, {page.stat().st_size / 1e6:.1f} MB, needs no network")
+
+
 def report_main(arguments: argparse.Namespace) -> None:
     """Writes the page --out, and beside it the folder of its name with the JSON and the plots.
 
