@@ -20,6 +20,7 @@ MUG = ROOT / "examples" / "data"
 
 # WebGL in software, as on a machine without a graphics card.
 SOFTWARE = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+VIEWER_IS_UP = "globalThis.vnregViewer !== undefined"
 
 
 @pytest.fixture(scope="session")
@@ -41,7 +42,7 @@ def open_page(browser: Browser) -> Iterator[Opened]:
     problems: list[str] = []
     contexts = []
 
-    def open_file(path: Path, **options: object) -> Page:
+    def open_file(path: Path, wait_for: str = VIEWER_IS_UP, **options: object) -> Page:
         settings = {"viewport": {"width": 900, "height": 600}, **options}
         context = browser.new_context(offline=True, **settings)  # type: ignore[arg-type]
         contexts.append(context)
@@ -57,7 +58,7 @@ def open_page(browser: Browser) -> Iterator[Opened]:
             ),
         )
         page.goto(url)
-        page.wait_for_function("globalThis.vnregViewer !== undefined")
+        page.wait_for_function(wait_for)
         return page
 
     yield open_file
