@@ -1,5 +1,5 @@
 # The front door. Each target installs what it needs; nothing has to be set up before.
-#   make demo      align two real scans, print the pose, make the page that shows them in 3D
+#   make demo      align two real scans, print the pose, open the page that shows them in 3D
 #   make test      all tests, C++ and Python
 #   make help      the rest
 SHELL := /bin/bash
@@ -35,7 +35,7 @@ endef
 debian-packages:
 	$(call install_debian,$(DEBIAN))
 
-$(VENV)/.installed: requirements/dev.txt requirements/train.txt requirements/batch.txt | debian-packages
+$(VENV)/.installed: requirements/dev.txt requirements/demo.txt requirements/train.txt requirements/batch.txt | debian-packages
 	python3 -m venv $(VENV)
 	$(PY) -m pip install -q -r requirements/dev.txt
 	$(PY) -m pip install -q --no-deps -e train_py
@@ -50,8 +50,16 @@ build: debian-packages ## the library and the program, at build/release/vnreg
 python: setup ## the Python module `vnreg`, into .venv
 	$(PY) -m pip install -q --no-build-isolation .
 
-demo: python build ## align two real scans, print the pose, make the page that shows them in 3D
-	$(PY) examples/demo/demo.py --check
+# The demo needs the program alone, and few Python packages.
+build/demo-env/.installed: requirements/demo.txt | debian-packages
+	python3 -m venv build/demo-env
+	build/demo-env/bin/python -m pip install -q -r $<
+	touch $@
+
+demo: build/demo-env/.installed ## align two real scans, print the pose, open the page that shows them in 3D
+	cmake --preset $(PRESET) > /dev/null
+	cmake --build --preset $(PRESET) --target vnreg_cli
+	build/demo-env/bin/python examples/demo/demo.py --program $(CLI) --check --open
 
 test: test-cpp test-python ## all tests
 
@@ -84,7 +92,7 @@ viewer-three: ## viewer/three.js from the npm package `three`; needs npm
 	$(call install_debian,esbuild)
 	viewer/make_three.sh
 
-viewer-picture: demo ## docs/viewer.webp, the demo's pair as the viewer shows it
+viewer-picture: demo setup ## docs/viewer.webp, the demo's pair as the viewer shows it
 	$(call install_debian,$(VIEWER_DEBIAN))
 	$(PY) viewer/take_picture.py build/demo/aligned_turned.html docs/viewer.webp
 

@@ -1,4 +1,4 @@
-"""Aligns two real scans of one object with the command line, and draws before and after.
+"""Aligns two real scans of one object with the command line, and shows before and after.
 
 The program does what a user would: `vnreg align SOURCE TARGET --json -o ALIGNED`. It then turns the
 source at random before a second run, because the starting pose must not matter.
@@ -9,9 +9,11 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import subprocess
 import sys
 import time
+import webbrowser
 from pathlib import Path
 from typing import Any
 
@@ -79,6 +81,7 @@ def main() -> None:
     parser.add_argument("--scans", type=Path, default=ROOT / "data/scans", help="cache folder")
     parser.add_argument("--out", type=Path, default=ROOT / "build/demo", help="folder of pictures")
     parser.add_argument("--mode", default="verified")
+    parser.add_argument("--open", action="store_true", help="show the last page, on a desktop")
     parser.add_argument("--check", action="store_true", help="fail if the pose is not the true one")
     arguments = parser.parse_args()
 
@@ -105,7 +108,9 @@ def main() -> None:
         caption = f"{report['ms']['total']:.0f} ms, overlap {report['overlap']:.0%}"
         draw(*clouds, f"vnreg align, mode {report['mode']}: {caption}", picture)
         print(f"picture: {picture}")
-        print(f"in 3D, open in a browser: {page_of(aligned)}")
+        print(f"in 3D, for any browser: {page_of(aligned)}")
+    if arguments.open and ("DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ):
+        webbrowser.open(page_of(aligned).resolve().as_uri())
     if arguments.check and max(errors) > LIMIT_DEG:
         sys.exit(f"rotation error above {LIMIT_DEG} degrees: {max(errors):.2f}")
 
