@@ -19,7 +19,7 @@ SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python test-isa soak \
         viewer viewer-three viewer-picture \
         check sanitize analyse valgrind stress fuzz fuzzers fuzz-builds fuzz-coverage \
-        bench bench-compare batch-kills evaluate train train-paper data model docs wheel clean
+        bench bench-compare batch-kills evaluate gallery train train-paper data model docs wheel clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -162,6 +162,9 @@ evaluate: python data $(VENV)/.peers ## all modes and peers on the test split, i
 	$(PY) -m vnreg_train.cli evaluate --methods modes peers --run runs/evaluate --jobs 2
 	$(PY) -m vnreg_train.cli report --run runs/evaluate
 	$(PY) docs/page_tables.py
+
+gallery: python data ## the worst pairs of the last `make evaluate` in one page with the viewer, runs/gallery.html
+	$(PY) -m vnreg_train.cli gallery --run runs/evaluate -o runs/gallery.html
 
 $(VENV)/.bench: requirements/bench.txt $(VENV)/.peers
 	$(PY) -m pip install -q -r requirements/bench.txt

@@ -17,6 +17,7 @@ from vnreg_train.model_file import read_model, write_model
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "training"))
 
+import tiny_run
 from test_descriptor_train import train_steps, trainer
 
 MODELS = Path(__file__).resolve().parents[3] / "models"
@@ -81,6 +82,19 @@ def test_a_checkpoint_tells_where_its_run_stands(tmp_path: Path) -> None:
     assert line and float(line[0].split()[-3]) == pytest.approx(float(weight.norm()), rel=1e-3)
     distance = re.search(r"last to averaged +(\S+)", text)
     assert distance and float(distance[1]) > 0
+
+
+def test_the_statistics_of_batch_norms_are_no_weights(tmp_path: Path) -> None:
+    for stage in ("coarse", "fine"):
+        run = tiny_run.trainer(tmp_path, stage)
+        tiny_run.train_steps(run, 2)
+        run.save()
+    own, average = (
+        torch.nn.utils.parameters_to_vector(network.parameters())
+        for network in (run.network, run.average.module)
+    )
+    distance = re.search(r"last to averaged +(\S+)", inspection(run.checkpoint))
+    assert distance and float(distance[1]) == pytest.approx(float((own - average).norm()), rel=1e-3)
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:

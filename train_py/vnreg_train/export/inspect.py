@@ -27,6 +27,7 @@ from vnreg_train.model_file import (
 Metadata = Mapping[str, MetadataValue]
 Tensors = Mapping[str, NDArray[Any]]
 WIDTH = 100
+STATISTICS = ("running_mean", "running_var", "num_batches_tracked")  # of batch norms
 
 
 class InspectError(ValueError):
@@ -199,7 +200,9 @@ def _clouds(tensors: Tensors) -> str:
 
 
 def _distance(network: Tensors, average: Tensors) -> float:
-    squares = (float(np.square(network[k] - v, dtype=np.float64).sum()) for k, v in average.items())
+    """Of what is learnt: the statistics of batch norms would drown it."""
+    learnt = {k: v for k, v in average.items() if k.rsplit(".", 1)[-1] not in STATISTICS}
+    squares = (float(np.square(network[k] - v, dtype=np.float64).sum()) for k, v in learnt.items())
     return float(sum(squares) ** 0.5)
 
 
