@@ -8,7 +8,7 @@ PY := $(VENV)/bin/python
 PRESET ?= release
 CLI := build/$(PRESET)/vnreg
 DEBIAN := cmake ninja-build ccache g++ libeigen3-dev catch2 libcli11-dev nlohmann-json3-dev \
-          libbenchmark-dev python3-dev python3-venv doxygen
+          libbenchmark-dev python3-dev python3-venv doxygen zsh groff-base
 FUZZ_DEBIAN := clang-14 libclang-rt-14-dev libomp-14-dev llvm-14
 # The viewer's tests: a browser, a font for it, and what joins the page's script.
 VIEWER_DEBIAN := chromium fonts-dejavu-core esbuild
@@ -78,8 +78,9 @@ test-isa: setup ## the tests that run the engine, on every instruction set of th
 soak: build ## 100,000 aligns without growth; 1,000 frames at 30 Hz without a missed deadline
 	tests/consumers/soak.sh build/$(PRESET) $(abspath build/soak)
 
-batch-kills: python ## 10,000 pairs of vnreg.batch, its client killed three times and resumed
+batch-kills: python build ## 10,000 pairs of vnreg.batch and of vnreg batch, killed three times and resumed
 	VNREG_BATCH_PAIRS=10000 $(PY) -m pytest -q tests/python/batch/test_batch_killed.py -k killed_client
+	VNREG_BATCH_PAIRS=10000 $(PY) -m pytest -q -s tests/python/cli/test_cli_batch_killed.py
 
 test-data: setup ## the test split of the furniture models, surfaces only
 	$(PY) -m vnreg_train.cli build-data --splits test --no-occupancy

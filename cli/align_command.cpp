@@ -2,82 +2,22 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <iterator>
+#include <memory>
 
+#include "align_many.hpp"
 #include "align_report.hpp"
-#include "cloud_file/cloud_file.hpp"
 #include "cloud_file/ply_writer.hpp"
-#include "cloud_file/text_scan.hpp"
 #include "html_view.hpp"
+#include "input.hpp"
+#include "no_pose.hpp"
 #include "rotation.hpp"
+#include "source_list.hpp"
 
 namespace vnreg::cli {
 namespace {
 
 using cloud_file::Points;
-
-struct NamedCloud {
-  const std::string& path;
-  const Points& points;
-};
-
-[[noreturn]] void refuse_input(const std::string& path, const std::string& message) {
-  throw CommandError(ExitCode::input, path + ": " + message);
-}
-
-bool is_finite(const std::array<double, 3>& point) {
-  return std::ranges::all_of(point, [](double value) { return std::isfinite(value); });
-}
-
-void refuse_if_not_finite(const NamedCloud& cloud) {
-  const auto bad = std::ranges::find_if_not(cloud.points, is_finite);
-  if (bad == cloud.points.end()) return;
-  const auto& [x, y, z] = *bad;
-  refuse_input(cloud.path, "point " + std::to_string(bad - cloud.points.begin() + 1) +
-                               ": expected finite coordinates, found " + number_text(x, 6) + " " +
-                               number_text(y, 6) + " " + number_text(z, 6));
-}
-
-void refuse_if_too_few(const NamedCloud& cloud, int min_points) {
-  if (cloud.points.size() >= static_cast<std::size_t>(min_points)) return;
-  refuse_input(cloud.path, "expected at least " + std::to_string(min_points) + " points, found " +
-                               std::to_string(cloud.points.size()));
-}
-
-void refuse_if_all_equal(const NamedCloud& cloud) {
-  const auto& points = cloud.points;
-  if (std::ranges::adjacent_find(points, std::ranges::not_equal_to{}) != points.end()) return;
-  refuse_input(cloud.path, "expected points that differ, found " + std::to_string(points.size()) +
-                               " equal points");
-}
-
-/// Says which cloud is to blame for a result without a pose.
-[[noreturn]] void refuse_clouds(const Result& result, const NamedCloud& source,
-                                const NamedCloud& target, int min_points) {
-  for (const NamedCloud& cloud : {source, target}) {
-    switch (result.status) {
-      case Status::too_few_points:
-        refuse_if_too_few(cloud, min_points);
-        break;
-      case Status::not_finite:
-        refuse_if_not_finite(cloud);
-        break;
-      case Status::degenerate:
-        refuse_if_all_equal(cloud);
-        break;
-      case Status::ok:
-      case Status::low_confidence:
-      case Status::ambiguous:
-      case Status::scales_differ:
-      case Status::timed_out:
-      case Status::cancelled:
-        break;
-    }
-  }
-  refuse_input(source.path + " and " + target.path,
-               "expected clouds that determine a rotation, found status " +
-                   std::string(to_string(result.status)));
-}
 
 void write_moved(const std::string& path, const Points& source, const Pose& pose) {
   Points moved(source.size());
@@ -106,10 +46,67 @@ std::string check_ply_name(const std::string& path) {
                                               : "expected a name that ends in .ply, found " + path;
 }
 
-/// CLI11 itself would let -1 and 2^64 pass.
-std::string check_seed(const std::string& text) {
-  if (cloud_file::parse_count(text)) return "";
-  return "expected a whole number from 0 to 2^64 - 1, found " + text;
+/// CLI11 has no last positional after several others.
+class AlignFormatter : public CLI::Formatter {
+ public:
+  std::string make_usage(const CLI::App*, std::string) const override {
+    return "Usage: vnreg align [OPTIONS] SOURCE... TARGET\n";
+  }
+};
+
+[[noreturn]] void refuse_clouds(const Result& result, const NamedCloud& source,
+                                const NamedCloud& target, int min_points) {
+  const bool in_time = result.status != Status::timed_out;
+  throw CommandError(in_time ? ExitCode::input : ExitCode::not_sure,
+                     why_no_pose(result, source, target, min_points));
+}
+
+/// The clouds of the command line, taken apart.
+struct Clouds {
+  std::vector<std::string> sources;
+  std::string target;
+};
+
+Clouds clouds_of(const AlignArguments& arguments) {
+  const auto last = std::prev(arguments.clouds.end());
+  return {{arguments.clouds.begin(), last}, *last};
+}
+
+Outcome align_one(const AlignArguments& arguments, const std::string& source_path,
+                  const std::string& target_path) {
+  const Points source = read_input_cloud(source_path, arguments.format);
+  const Points target = read_input_cloud(target_path, arguments.format);
+  const Model model = arguments.engine.load();
+  Registrar registrar = make_registrar(model, arguments.engine.options);
+  const Result& result = registrar.align(source, target);
+  if (!result.has_pose) {
+    refuse_clouds(result, {input_name(source_path), source}, {input_name(target_path), target},
+                  model.min_points());
+  }
+  if (!arguments.output.empty()) write_moved(arguments.output, source, result.T_target_source);
+  if (!arguments.html.empty()) {
+    const Explanation explanation = registrar.explain();
+    write_html_view(arguments.html, {source, target, source_path, target_path, result, &explanation,
+                                     model.name(), to_string(arguments.engine.options.mode)});
+  }
+  const AlignReport report{result, model.name(), arguments.engine.options.mode, middle_of(source)};
+  return {result.status == Status::ok ? ExitCode::ok : ExitCode::not_sure,
+          arguments.json ? to_json(report) : to_text(report)};
+}
+
+void refuse_usage(bool wrong, const std::string& expected, const std::string& found) {
+  if (wrong) throw CommandError(ExitCode::usage, "expected " + expected + ", found " + found);
+}
+
+void check_usage(const AlignArguments& arguments, bool many) {
+  const auto inputs = std::ranges::count(arguments.clouds, "-");
+  refuse_usage(inputs > 1, "standard input (-) for one cloud", "it for several");
+  refuse_usage(many && inputs > 0 && arguments.clouds.back() != "-", "files as several sources",
+               "standard input (-) among them");
+  refuse_usage(many && !arguments.output.empty(), "one source with --output",
+               "several, a folder or a pattern");
+  refuse_usage(many && !arguments.html.empty(), "one source with --html",
+               "several, a folder or a pattern");
 }
 
 }  // namespace
@@ -117,9 +114,14 @@ std::string check_seed(const std::string& text) {
 CLI::App* add_align_command(CLI::App& app, AlignArguments& arguments) {
   CLI::App* command = app.add_subcommand(
       "align", "Find the rigid pose that moves SOURCE onto TARGET, from any starting pose.");
-  command->add_option("SOURCE", arguments.source, "Cloud to move")->type_name("FILE")->required();
-  command->add_option("TARGET", arguments.target, "Cloud to move it onto")
+  command->formatter(std::make_shared<AlignFormatter>());
+  // CLI11 would give several sources all that follows: the last one is taken off them later.
+  command
+      ->add_option("SOURCE...TARGET", arguments.clouds,
+                   "The cloud to move, then the one to move it onto; -: standard input. Several "
+                   "sources, a folder or a pattern such as 'scans/*.ply': each onto the target")
       ->type_name("FILE")
+      ->expected(-2)
       ->required();
   command->add_flag("--json", arguments.json, "Print one JSON object instead of text");
   command
@@ -131,34 +133,19 @@ CLI::App* add_align_command(CLI::App& app, AlignArguments& arguments) {
       ->add_option("--html", arguments.html,
                    "Write a page that shows the clouds in 3D to this file; it needs no network")
       ->type_name("FILE.html");
-  command->add_option("--model", arguments.model, "Model file; default: the built-in model")
-      ->type_name("FILE");
+  add_engine_options(*command, arguments.engine);
+  add_threads_option(*command, arguments.engine.options.threads,
+                     "Threads; 0 (default): as many as OpenMP says");
   command
       ->add_option_function<std::string>(
-          "--mode",
+          "--format",
           [&arguments](const std::string& name) {
-            arguments.options.mode = name == "coarse"  ? Mode::coarse
-                                     : name == "paper" ? Mode::paper
-                                                       : Mode::verified;
+            arguments.format = cloud_file::format_of_extension(name);
           },
-          "verified (default): the pose that explains both clouds best, out of many; paper: the "
-          "coarse and the fine register; coarse: it alone")
-      ->type_name("MODE")
-      ->check(CLI::IsMember({"coarse", "paper", "verified"}));
-  command->add_option("--threads", arguments.options.threads, "Threads; 0: as many as OpenMP says")
-      ->type_name("N")
-      ->check(CLI::Range(0, 1024));
-  command
-      ->add_option(
-          "--max-points", arguments.options.max_points,
-          "Use at most so many points of a cloud (64 to 16384); 0: as the model was trained")
-      ->type_name("N")
-      ->check(CLI::Range(0, 16384));
-  command->add_flag("--drop-non-finite", arguments.options.drop_non_finite,
-                    "Leave out points with NaN or infinite coordinates instead of refusing them");
-  command->add_option("--seed", arguments.options.seed, "Seed of the choice of those points")
-      ->check(CLI::Validator(check_seed, ""))
-      ->type_name("N");
+          "Format of standard input; default: by its content")
+      ->type_name("FORMAT")
+      ->check(CLI::IsMember({"ply", "pcd", "obj", "off", "xyz", "txt", "csv", "npy"}));
+  command->add_flag("--quiet", arguments.quiet, "No progress");
   command->footer(
       "Example: vnreg align scan.ply model.pcd --json -o moved.ply\n"
       "Clouds are read as PLY, PCD, OBJ, OFF, XYZ, TXT, CSV or NPY.\n"
@@ -167,25 +154,11 @@ CLI::App* add_align_command(CLI::App& app, AlignArguments& arguments) {
 }
 
 Outcome run_align(const AlignArguments& arguments) {
-  const Points source = cloud_file::read_cloud(arguments.source);
-  const Points target = cloud_file::read_cloud(arguments.target);
-  const Model model = arguments.model.empty() ? Model::builtin() : load_model(arguments.model);
-  Registrar registrar = make_registrar(model, arguments.options);
-  const Result& result = registrar.align(source, target);
-  if (!result.has_pose) {
-    refuse_clouds(result, {arguments.source, source}, {arguments.target, target},
-                  model.min_points());
-  }
-  if (!arguments.output.empty()) write_moved(arguments.output, source, result.T_target_source);
-  if (!arguments.html.empty()) {
-    const Explanation explanation = registrar.explain();
-    write_html_view(arguments.html,
-                    {source, target, arguments.source, arguments.target, result, &explanation,
-                     model.name(), to_string(arguments.options.mode)});
-  }
-  const AlignReport report{result, model.name(), arguments.options.mode, middle_of(source)};
-  return {result.status == Status::ok ? ExitCode::ok : ExitCode::not_sure,
-          arguments.json ? to_json(report) : to_text(report)};
+  const auto [sources, target] = clouds_of(arguments);
+  const bool many = is_many(sources);
+  check_usage(arguments, many);
+  if (!many) return align_one(arguments, sources.front(), target);
+  return align_many(arguments, list_sources(sources), target);
 }
 
 }  // namespace vnreg::cli

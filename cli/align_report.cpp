@@ -1,5 +1,7 @@
 #include "align_report.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,6 +15,7 @@
 
 #include "command.hpp"
 #include "rotation.hpp"
+#include "terminal.hpp"
 
 namespace vnreg::cli {
 namespace {
@@ -136,7 +139,11 @@ std::string to_text(const AlignReport& report) {
   text << "translation  " << vector_text({pose[3], pose[7], pose[11]}, 8) << '\n';
   if (!std::isnan(result.covariance[0]))
     text << "uncertainty  " << uncertainty_text(report) << '\n';
-  text << "status       " << to_string(result.status) << '\n';
+  const bool trusted = result.status == Status::ok;
+  text << "status       "
+       << coloured(to_string(result.status), trusted ? Colour::green : Colour::yellow,
+                   STDOUT_FILENO)
+       << '\n';
   text << "confidence   "
        << (std::isnan(result.confidence) ? "n/a" : number_text(result.confidence, 3)) << '\n';
   if (!std::isnan(result.score)) text << "score        " << number_text(result.score, 3) << '\n';

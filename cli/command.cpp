@@ -54,6 +54,14 @@ Registrar make_registrar(const Model& model, const Options& options) {
   }
 }
 
+std::uint64_t head_checksum(std::span<const std::byte> file) {
+  std::uint64_t checksum = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    checksum |= std::to_integer<std::uint64_t>(file[60 + i]) << (8 * i);
+  }
+  return checksum;
+}
+
 std::string number_text(double value, int digits) {
   std::ostringstream stream;
   stream.imbue(std::locale::classic());

@@ -17,8 +17,8 @@ namespace vnreg::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using model_format::DType;
 using model_format::AlignedBytes;
+using model_format::DType;
 using model_format::ModelFile;
 using model_format::Tensor;
 
@@ -44,15 +44,6 @@ std::string shipped_model(const std::string& name) {
 
 std::string golden_beside(const std::string& model) {
   return fs::path(model).replace_extension(".golden.vnr").string();
-}
-
-/// The head checksum that identifies a `.vnr` file (model_format/SPEC.md, header field 10).
-std::uint64_t head_checksum(std::span<const std::byte> file) {
-  std::uint64_t checksum = 0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    checksum |= std::to_integer<std::uint64_t>(file[60 + i]) << (8 * i);
-  }
-  return checksum;
 }
 
 std::vector<double> values_of(const Tensor& tensor) {

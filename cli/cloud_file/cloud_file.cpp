@@ -50,18 +50,7 @@ std::optional<Format> format_by_content(std::string_view bytes) {
 std::optional<Format> format_by_extension(std::string_view path) {
   const std::size_t dot = path.rfind('.');
   if (dot == std::string_view::npos) return std::nullopt;
-  std::string extension(path.substr(dot + 1));
-  std::ranges::transform(extension, extension.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  static constexpr std::pair<std::string_view, Format> extensions[] = {
-      {"ply", Format::ply},  {"pcd", Format::pcd},  {"obj", Format::obj},  {"off", Format::off},
-      {"xyz", Format::text}, {"txt", Format::text}, {"csv", Format::text}, {"npy", Format::npy},
-  };
-  for (const auto& [name, format] : extensions) {
-    if (name == extension) return format;
-  }
-  return std::nullopt;
+  return format_of_extension(path.substr(dot + 1));
 }
 
 // ---- the bytes ----
@@ -70,28 +59,47 @@ using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 
 [[noreturn]] void fail_to_read(int error) { fail("a file that can be read", std::strerror(error)); }
 
-/// Reads to the end, in growing pieces, so that pipes work and no size is believed.
+}  // namespace
+
+std::optional<Format> format_of_extension(std::string_view extension) {
+  std::string name(extension);
+  std::ranges::transform(name, name.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  static constexpr std::pair<std::string_view, Format> extensions[] = {
+      {"ply", Format::ply},  {"pcd", Format::pcd},  {"obj", Format::obj},  {"off", Format::off},
+      {"xyz", Format::text}, {"txt", Format::text}, {"csv", Format::text}, {"npy", Format::npy},
+  };
+  for (const auto& [known, format] : extensions) {
+    if (known == name) return format;
+  }
+  return std::nullopt;
+}
+
 std::string read_bytes(const std::string& path) {
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored)) fail("a file", "a directory");
   const File file(std::fopen(path.c_str(), "rb"), &std::fclose);
   if (!file) fail_to_read(errno);
+  return read_bytes(file.get());
+}
+
+// In growing pieces, so that pipes work and no size is believed.
+std::string read_bytes(std::FILE* file) {
   std::string bytes;
   std::size_t piece = std::size_t{1} << 16U;
   for (;;) {
     const std::size_t old_size = bytes.size();
     bytes.resize(old_size + piece);
-    const std::size_t got = std::fread(bytes.data() + old_size, 1, piece, file.get());
+    const std::size_t got = std::fread(bytes.data() + old_size, 1, piece, file);
     bytes.resize(old_size + got);
     if (got < piece) break;
     if (bytes.size() > max_file_bytes) fail("a file of at most 8 GiB", "more");
     piece = bytes.size();
   }
-  if (std::ferror(file.get()) != 0) fail_to_read(errno);
+  if (std::ferror(file) != 0) fail_to_read(errno);
   return bytes;
 }
-
-}  // namespace
 
 std::optional<Format> detect_format(std::string_view bytes, std::string_view path) {
   if (const auto format = format_by_content(bytes)) return format;
@@ -107,7 +115,11 @@ Points parse_cloud(std::string_view bytes, std::string_view path) {
     fail("a point cloud as " + std::string(known_formats),
          "a file that begins " + quoted(bytes.substr(0, 16)));
   }
-  switch (*format) {
+  return parse_cloud_as(*format, bytes);
+}
+
+Points parse_cloud_as(Format format, std::string_view bytes) {
+  switch (format) {
     case Format::ply:
       return read_ply(bytes);
     case Format::pcd:

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <cstdio>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -31,6 +32,17 @@ std::optional<Format> detect_format(std::string_view bytes, std::string_view pat
 /// Reads the points of a file that is already in memory; `path` only helps to choose the format.
 /// Throws CloudFileError, without the name of the file.
 Points parse_cloud(std::string_view bytes, std::string_view path);
+
+/// Reads the points of a file that is already in memory and has this format. Throws as above.
+Points parse_cloud_as(Format format, std::string_view bytes);
+
+/// All bytes of the file at `path`, or of an open file from where it stands. Throws CloudFileError,
+/// without the name of the file.
+std::string read_bytes(const std::string& path);
+std::string read_bytes(std::FILE* file);
+
+/// The format whose usual extension is `extension`, without its dot; case does not matter.
+std::optional<Format> format_of_extension(std::string_view extension);
 
 /// Reads the points of the file at `path` (a pipe works too). Throws CloudFileError, whose text
 /// begins with the path and is one line.

@@ -28,6 +28,10 @@ done
 prefix="$folder/root/usr"
 libdir=$(cd "$prefix" && dirname "$(ls lib/libvnreg.so lib/*/libvnreg.so 2> /dev/null)")
 "$prefix/bin/vnreg" selftest | tail -n 1
+# The program's description of itself is what it would print.
+"$prefix/bin/vnreg" manual | cmp - "$prefix/share/man/man1/vnreg.1"
+"$prefix/bin/vnreg" completion bash | cmp - "$prefix/share/bash-completion/completions/vnreg"
+"$prefix/bin/vnreg" completion zsh | cmp - "$prefix/share/zsh/vendor-completions/_vnreg"
 "$here/build_with_cmake.sh" "$here/find_package" "$folder/shared" \
   "-DCMAKE_PREFIX_PATH=$prefix" -DCOMPONENT=shared
 "$here/build_with_pkg_config.sh" "$prefix" "$libdir" "$folder/pkg_config"

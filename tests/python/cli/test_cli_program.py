@@ -14,7 +14,9 @@ from cli_program import FAILURE, INPUT, OK, Program, repository
 from vnreg_train.model_file import read_model, write_model
 
 
-@pytest.mark.parametrize("command", [[], ["align"], ["info"], ["selftest"]])
+@pytest.mark.parametrize(
+    "command", [[], *([name] for name in ("align", "batch", "bench", "info", "selftest"))]
+)
 def test_help_gives_an_example(vnreg: Program, command: list[str]) -> None:
     run = vnreg(*command, "--help")
     assert (run.code, run.stderr) == (OK, "")

@@ -93,10 +93,13 @@ def folder(tmp_path: Path) -> Path:
         (tmp_path / name).symlink_to(library_folder() / name)
     points = (tmp_path / "mug_1.xyz").read_text(encoding="utf-8")
     head = f"{points.count(chr(10))}\nproperty float x\nproperty float y\nproperty float z\n"
-    for name in ("scan.ply", "source.ply", "target.ply"):
+    (tmp_path / "scans").mkdir()
+    scans = ("scan.ply", "scan_1.ply", "scan_2.ply", "scans/1.ply", "source.ply", "target.ply")
+    for name in scans:
         (tmp_path / name).write_text(
             f"ply\nformat ascii 1.0\nelement vertex {head}end_header\n{points}", encoding="utf-8"
         )
+    (tmp_path / "pairs.csv").write_text("source,target\nmug_1.xyz,mug_2.xyz\n", encoding="utf-8")
     (tmp_path / "model.pcd").write_text(
         "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
         f"WIDTH 1200\nHEIGHT 1\nPOINTS 1200\nDATA ascii\n{points}",
@@ -163,7 +166,11 @@ def run_shell(block: Block, folder: Path) -> None:
     for line in block.text.splitlines():
         name, *arguments = shlex.split(line, comments=True)
         if Path(name).name == "vnreg":
-            run(folder, program_path(), *arguments, ok=(0, 4))  # 4: a pose, but not a sure one
+            # By a shell, for its redirections. 4: a pose, but not a sure one
+            call = shlex.join([str(program_path()), *arguments])
+            for redirection in "<>":
+                call = call.replace(f"'{redirection}'", redirection)
+            run(folder, "bash", "-c", call, ok=(0, 4))
         elif name == "make":
             run(ROOT, "make", "-n", *arguments)
         else:

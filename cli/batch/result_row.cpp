@@ -1,0 +1,162 @@
+#include "batch/result_row.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "batch/csv.hpp"
+#include "cloud_file/text_scan.hpp"
+
+namespace vnreg::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// ---- CSV ----
+
+std::string csv_text(const std::string& text) { return csv_field(text); }
+
+std::string csv_text(std::int64_t number) { return std::to_string(number); }
+
+std::string csv_text(double number) {
+  if (!std::isfinite(number)) return "";
+  std::array<char, 32> digits{};
+  const auto end = std::to_chars(digits.begin(), digits.end(), number).ptr;
+  return {digits.begin(), end};
+}
+
+std::string csv_text(const std::optional<Pose>& pose) {
+  std::string text;
+  if (!pose) return text;
+  for (const double number : *pose) {
+    if (!text.empty()) text += ' ';
+    text += csv_text(number);
+  }
+  return text;
+}
+
+bool parse_csv_text(const std::string& text, std::string& value) {
+  value = text;
+  return true;
+}
+
+bool parse_csv_text(const std::string& text, std::int64_t& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc{} && end == text.data() + text.size();
+}
+
+bool parse_csv_text(const std::string& text, double& value) {
+  if (text.empty()) return true;
+  const auto number = cloud_file::parse_number(text);
+  if (number) value = *number;
+  return number.has_value();
+}
+
+bool parse_csv_text(const std::string& text, std::optional<Pose>& value) {
+  if (text.empty()) return true;
+  Pose pose{};
+  std::string_view rest = text;
+  for (double& number : pose) {
+    const auto parsed = cloud_file::parse_number(cloud_file::next_word(rest));
+    if (!parsed) return false;
+    number = *parsed;
+  }
+  value = pose;
+  return cloud_file::trimmed(rest).empty();
+}
+
+std::string csv_line(const ResultRow& row) {
+  std::string line;
+  for_each_column(row, [&](std::string_view name, const auto& field) {
+    if (name != "row") line += ',';
+    line += csv_text(field);
+  });
+  return line + '\n';
+}
+
+std::optional<ResultRow> parse_csv_row(std::string_view line) {
+  const auto fields = split_csv(line);
+  if (!fields) return std::nullopt;
+  ResultRow row;
+  std::size_t column = 0;
+  bool good = true;
+  for_each_column(row, [&](std::string_view, auto& field) {
+    good = good && column < fields->size() && parse_csv_text((*fields)[column], field);
+    ++column;
+  });
+  return good && column == fields->size() ? std::optional(row) : std::nullopt;
+}
+
+// ---- JSON lines ----
+
+template <class T>
+Json json_of(const T& value) {
+  return value;  // the library writes NaN as null
+}
+
+Json json_of(const std::optional<Pose>& pose) { return pose ? Json(*pose) : Json(nullptr); }
+
+std::string json_line(const ResultRow& row) {
+  Json json;
+  for_each_column(row, [&](const char* name, const auto& field) { json[name] = json_of(field); });
+  if (row.error.empty()) json["error"] = nullptr;
+  return json.dump() + '\n';
+}
+
+template <class T>
+void read_json(const Json& json, T& value) {
+  if (!json.is_null()) json.get_to(value);
+}
+
+void read_json(const Json& json, std::optional<Pose>& value) {
+  if (!json.is_null()) value = json.get<Pose>();
+}
+
+std::optional<ResultRow> parse_json_row(std::string_view line) {
+  try {
+    const Json json = Json::parse(line);
+    ResultRow row;
+    for_each_column(row, [&](const char* name, auto& field) { read_json(json.at(name), field); });
+    return row;
+  } catch (const Json::exception&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+void set_result(ResultRow& row, const Result& result) {
+  row.status = to_string(result.status);
+  row.points_source = static_cast<std::int64_t>(result.points_source);
+  row.points_target = static_cast<std::int64_t>(result.points_target);
+  row.ms = result.ms.total;
+  if (!result.has_pose) return;
+  row.T_target_source = result.T_target_source;
+  row.confidence = result.confidence;
+  row.overlap = result.overlap;
+  row.rmse = result.rmse;
+  row.inlier_distance = result.inlier_distance;
+  row.score = result.score;
+}
+
+std::string rows_header(RowFormat format) {
+  if (format == RowFormat::jsonl) return "";
+  std::string line;
+  const ResultRow row;
+  for_each_column(row, [&](std::string_view name, const auto&) {
+    if (!line.empty()) line += ',';
+    line += name;
+  });
+  return line + '\n';
+}
+
+std::string row_line(const ResultRow& row, RowFormat format) {
+  return format == RowFormat::csv ? csv_line(row) : json_line(row);
+}
+
+std::optional<ResultRow> parse_row(std::string_view line, RowFormat format) {
+  return format == RowFormat::csv ? parse_csv_row(line) : parse_json_row(line);
+}
+
+}  // namespace vnreg::cli
