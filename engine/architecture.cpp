@@ -51,6 +51,11 @@ double read_rms_radius(const ModelFile& file, Family family) {
   return radius;
 }
 
+/// A switch that files before it do not have: true then.
+bool unless_false(const ModelFile& file, std::string_view key) {
+  return !file.has(key) || file.get_bool(key);
+}
+
 void read_paper_parameters(const ModelFile& file, Architecture& a) {
   a.channels_local = read_index(file, "channels.local", 4, max_channels);
   if (a.channels_local % 4 != 0) {
@@ -62,6 +67,8 @@ void read_paper_parameters(const ModelFile& file, Architecture& a) {
   a.channels_significance[1] = read_index(file, "channels.significance.1", 1, max_channels);
   a.neighbours = read_index(file, "neighbours", 1, 64);
   a.shared_direction = file.get_bool("relu.shared_direction");
+  a.shared_encoder = unless_false(file, "ablation.shared_encoder");
+  a.invariant_layer = unless_false(file, "ablation.invariant_layer");
   a.fine_iterations = read_index(file, "fine.iterations", 0, 16);
   a.keep_divisor = read_index(file, "fine.keep_divisor", 1, 64);
 }

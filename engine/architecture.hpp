@@ -28,6 +28,10 @@ struct Architecture {
   Index channels_significance[2] = {0, 0};
   Index neighbours = 0;
   bool shared_direction = false;
+  /// Ablations of the paper, true in every network that is in use: whether the local module goes on
+  /// from the encoder's latent, and whether descriptors are made by the invariant layer.
+  bool shared_encoder = true;
+  bool invariant_layer = true;
   Index fine_iterations = 0;
   Index keep_divisor = 0;
   double rms_radius = 0;

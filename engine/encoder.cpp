@@ -58,8 +58,7 @@ void record(const char* name, Floats Features::*buffer, Index channels, Workspac
 }
 
 /// The first block of network 0, from the edge vectors.
-void run_first_block(const ModelData& model, Workspace& w) noexcept {
-  const kernels::EdgeBlock& block = model.network0_first;
+void run_first_block(const kernels::EdgeBlock& block, Workspace& w) noexcept {
   w.for_each_tile([&](Index side, Index tile, ThreadScratch& scratch) {
     Features& f = w.features[side];
     const Index width = tile_width(w.cloud[side], tile);
@@ -93,18 +92,19 @@ void run_pooled_block(const VnBlock& block, Workspace& w) noexcept {
   }
 }
 
-/// features.global = VN-linear(VN-ReLU(features.pooled)).
-void run_global_head(const ModelData& model, Workspace& w) noexcept {
-  const Index rows = kernels::padded(model.arch.channels_global);
+/// `to` = VN-linear(VN-ReLU(features.pooled)).
+void run_global_head(const EncoderData& encoder, const Architecture& arch, Floats Features::*to,
+                     Workspace& w) noexcept {
+  const Index rows = kernels::padded(arch.channels_global);
   for (const Index side : w.sides) {
     Features& f = w.features[side];
-    const Index direction_rows = model.global_direction.padded_rows();
+    const Index direction_rows = encoder.global_direction.padded_rows();
     const auto pooled = kernels::tile_view<const float>(f.pooled.data(), rows, 1);
     const auto direction = kernels::tile_view(f.direction.data(), direction_rows, 1);
-    kernels::multiply(model.global_direction, f.pooled.data(), rows, 3, f.direction.data(),
+    kernels::multiply(encoder.global_direction, f.pooled.data(), rows, 3, f.direction.data(),
                       direction_rows);
     const float* activated = f.direction.data();
-    if (model.arch.shared_direction) {
+    if (arch.shared_direction) {
       kernels::vn_relu_shared(1, rows, pooled,
                               {direction.data, direction.point_stride, direction.component_stride},
                               kernels::tile_view(f.pooled.data(), rows, 1));
@@ -112,8 +112,7 @@ void run_global_head(const ModelData& model, Workspace& w) noexcept {
     } else {
       kernels::vn_relu(1, rows, pooled, direction);
     }
-    kernels::multiply(model.global_fc, activated, rows, 3, f.global.data(), rows);
-    w.recorder.vector(side_name(side), "global", f.global.data(), rows, model.arch.channels_global);
+    kernels::multiply(encoder.global_fc, activated, rows, 3, (f.*to).data(), rows);
   }
 }
 
@@ -133,12 +132,11 @@ void run_significance(const ModelData& model, const float* descriptors, Index wi
   for (Index p = 0; p < width; ++p) significance[p] = x[p * x_rows];
 }
 
-/// From the local features of a tile to its descriptors.
-void run_invariant_layer(const ModelData& model, const float* local, Index width, ThreadScratch& s,
-                         float* descriptors) noexcept {
-  const Index local_rows = model.network2[1].out_rows();
+/// From the local features of a tile to its frames.
+void run_invariant_layer(const ModelData& model, const float* local, Index width,
+                         ThreadScratch& s) noexcept {
   const float* v = local;
-  Index v_rows = local_rows;
+  Index v_rows = model.network2[1].out_rows();
   for (std::size_t i = 0; i < 2; ++i) {
     const kernels::VnNormLayer& layer = model.invariant[i];
     kernels::vn_norm_layer(layer, v, v_rows, width, s.projected.data(), s.direction.data(),
@@ -146,8 +144,27 @@ void run_invariant_layer(const ModelData& model, const float* local, Index width
     v = s.invariant[i].data();
     v_rows = layer.out_rows();
   }
-  const Index frame_rows = model.frame.padded_rows();
   kernels::multiply(model.frame, v, v_rows, 3 * width, s.frame.data(), frame_rows);
+}
+
+/// The frame of a model without invariant layer: the products with it are the vectors themselves.
+void set_identity_frame(Index width, ThreadScratch& s) noexcept {
+  std::fill_n(s.frame.begin(), 3 * frame_rows * width, 0.0f);
+  for (Index axis = 0; axis < 3; ++axis) {
+    float* columns = s.frame.data() + axis * width * frame_rows;
+    for (Index p = 0; p < width; ++p) columns[p * frame_rows + axis] = 1.0f;
+  }
+}
+
+/// From the local features of a tile to its descriptors.
+void describe(const ModelData& model, const float* local, Index width, ThreadScratch& s,
+              float* descriptors) noexcept {
+  const Index local_rows = model.network2[1].out_rows();
+  if (model.arch.invariant_layer) {
+    run_invariant_layer(model, local, width, s);
+  } else {
+    set_identity_frame(width, s);
+  }
   kernels::invariant_products(local, local_rows, s.frame.data(), frame_rows, width,
                               s.products.data());
   kernels::linear(model.descriptor, s.products.data(), 3 * local_rows, width, descriptors);
@@ -164,10 +181,9 @@ void run_last_local_block(const ModelData& model, Workspace& w) noexcept {
     float* descriptors = f.descriptors.data() + first * model.descriptor.padded_rows();
     kernels::vn_block(block, f.constants, tile_of(f.other.data(), block.half, tile), width,
                       scratch.block, scratch.local.data());
-    run_invariant_layer(model, scratch.local.data(), width, scratch, descriptors);
+    describe(model, scratch.local.data(), width, scratch, descriptors);
     run_significance(model, descriptors, width, scratch, f.significance.data() + first);
     if (w.recorder.enabled()) {
-      const Index frame_rows = model.frame.padded_rows();
       std::copy_n(scratch.frame.data(), 3 * frame_rows * width,
                   tile_of(f.frame.data(), frame_rows, tile));
       std::copy_n(scratch.local.data(), 3 * block.out_rows() * width,
@@ -189,33 +205,54 @@ void record_local_stages(const ModelData& model, Workspace& w) noexcept {
   }
 }
 
+/// The encoder, from the edges to features.latent and the global feature in `to`. Of an encoder of
+/// the local module's own no stage is recorded: they would have the shared one's names.
+void run_encoder(const EncoderData& encoder, const Architecture& arch, Floats Features::*to,
+                 Workspace& w) noexcept {
+  const bool recorded = to == &Features::global;
+  const Index channels = arch.channels_global;
+  const Index rows = kernels::padded(channels);
+  const auto record_block = [&](const char* name, Floats Features::*buffer) {
+    if (recorded) record(name, buffer, channels, w);
+  };
+  run_first_block(encoder.network0_first, w);
+  record_block("network0.block0", &Features::latent);
+  pool(rows, encoder.network0_rest[0], w);
+  run_block(encoder.network0_rest[0], &Features::latent, &Features::other, w);
+  record_block("network0.block1", &Features::other);
+  pool(rows, encoder.network0_rest[1], w);
+  run_block(encoder.network0_rest[1], &Features::other, &Features::latent, w);
+  record_block("network0.block2", &Features::latent);
+  pool(rows, encoder.network1[0], w);
+  run_block(encoder.network1[0], &Features::latent, &Features::other, w);
+  record_block("network1.block0", &Features::other);
+  pool(rows, encoder.network1[1], w);
+  run_pooled_block(encoder.network1[1], w);
+  run_global_head(encoder, arch, to, w);
+}
+
 }  // namespace
 
 void encode_global(const ModelData& model, Workspace& w) noexcept {
-  const Index channels = model.arch.channels_global;
-  const Index rows = kernels::padded(channels);
   find_edges(w);
-  run_first_block(model, w);
-  record("network0.block0", &Features::latent, channels, w);
-  pool(rows, model.network0_rest[0], w);
-  run_block(model.network0_rest[0], &Features::latent, &Features::other, w);
-  record("network0.block1", &Features::other, channels, w);
-  pool(rows, model.network0_rest[1], w);
-  run_block(model.network0_rest[1], &Features::other, &Features::latent, w);
-  record("network0.block2", &Features::latent, channels, w);
-  pool(rows, model.network1[0], w);
-  run_block(model.network1[0], &Features::latent, &Features::other, w);
-  record("network1.block0", &Features::other, channels, w);
-  pool(rows, model.network1[1], w);
-  run_pooled_block(model.network1[1], w);
-  run_global_head(model, w);
+  run_encoder(model.encoder, model.arch, &Features::global, w);
+  const Index channels = model.arch.channels_global;
+  for (const Index side : w.sides) {
+    w.recorder.vector(side_name(side), "global", w.features[side].global.data(),
+                      kernels::padded(channels), channels);
+  }
 }
 
 void encode_local(const ModelData& model, Workspace& w) noexcept {
   const Index channels = model.arch.channels_local;
+  Floats Features::*global = &Features::global;
+  if (model.local_encoder) {
+    global = &Features::local_global;
+    run_encoder(*model.local_encoder, model.arch, global, w);
+  }
   for (const Index side : w.sides) {
     Features& f = w.features[side];
-    kernels::set_constants(model.network2[0], f.global.data(), f.constants);
+    kernels::set_constants(model.network2[0], (f.*global).data(), f.constants);
   }
   run_block(model.network2[0], &Features::latent, &Features::other, w);
   record("network2.block0", &Features::other, channels, w);

@@ -31,31 +31,29 @@ kernels::VnBlockTensors read_block(TensorSet& tensors, const Architecture& arch,
   return t;
 }
 
-void read_encoder(TensorSet& tensors, ModelData& m) {
-  const Architecture& a = m.arch;
+EncoderData read_encoder(TensorSet& tensors, const Architecture& a, const std::string& prefix) {
+  EncoderData e;
   const Index c = a.channels_global;
   // Tensors are asked for one after the other, never as arguments of one call, whose order is the
   // compiler's choice: of two that are wrong, every build names the same.
-  const std::span<const float> pre = tensors.matrix("encoder.pre", 2 * c, 3);
-  m.network0_first =
-      kernels::make_edge_block(pre, read_block(tensors, a, "encoder.network0.0", 2 * c, c));
+  const std::span<const float> pre = tensors.matrix(prefix + ".pre", 2 * c, 3);
+  e.network0_first =
+      kernels::make_edge_block(pre, read_block(tensors, a, prefix + ".network0.0", 2 * c, c));
   for (std::size_t i = 0; i < 2; ++i) {
     const std::string number = std::to_string(i);
-    m.network0_rest[i] = kernels::make_vn_block(
-        read_block(tensors, a, "encoder.network0." + std::to_string(i + 1), 2 * c, c));
-    m.network1[i] =
-        kernels::make_vn_block(read_block(tensors, a, "encoder.network1." + number, 2 * c, c));
+    e.network0_rest[i] = kernels::make_vn_block(
+        read_block(tensors, a, prefix + ".network0." + std::to_string(i + 1), 2 * c, c));
+    e.network1[i] =
+        kernels::make_vn_block(read_block(tensors, a, prefix + ".network1." + number, 2 * c, c));
   }
-  m.global_direction = tensors.packed("encoder.global.relu", direction_rows(a, c), c);
-  m.global_fc = tensors.packed("encoder.global.fc", c, c);
+  e.global_direction = tensors.packed(prefix + ".global.relu", direction_rows(a, c), c);
+  e.global_fc = tensors.packed(prefix + ".global.fc", c, c);
+  return e;
 }
 
-void read_local_module(TensorSet& tensors, ModelData& m) {
+void read_invariant_layer(TensorSet& tensors, ModelData& m) {
   const Architecture& a = m.arch;
   const Index l = a.channels_local;
-  m.network2[0] =
-      make_vn_block(read_block(tensors, a, "local.network2.0", 2 * a.channels_global, l));
-  m.network2[1] = kernels::make_vn_block(read_block(tensors, a, "local.network2.1", 2 * l, l));
   for (std::size_t i = 0; i < 2; ++i) {
     const std::string name = "local.invariant." + std::to_string(i);
     const Index in = i == 0 ? l : l / 2;
@@ -67,6 +65,15 @@ void read_local_module(TensorSet& tensors, ModelData& m) {
     m.invariant[i] = kernels::make_vn_norm_layer(fc, direction, scale, shift, a.shared_direction);
   }
   m.frame = tensors.packed("local.invariant.2.fc", 3, l / 4);
+}
+
+void read_local_module(TensorSet& tensors, ModelData& m) {
+  const Architecture& a = m.arch;
+  const Index l = a.channels_local;
+  m.network2[0] =
+      make_vn_block(read_block(tensors, a, "local.network2.0", 2 * a.channels_global, l));
+  m.network2[1] = kernels::make_vn_block(read_block(tensors, a, "local.network2.1", 2 * l, l));
+  if (a.invariant_layer) read_invariant_layer(tensors, m);
   const RowMajorMatrix weight =
       tensors.dense("local.descriptor.weight", a.channels_descriptor, 3 * l);
   m.descriptor = kernels::make_descriptor_layer(
@@ -112,7 +119,10 @@ std::shared_ptr<const ModelData> read_model_data(const ModelFile& file) {
     tensors.refuse_others("vnreg");
     return model;
   }
-  read_encoder(tensors, *model);
+  model->encoder = read_encoder(tensors, model->arch, "encoder");
+  if (!model->arch.shared_encoder) {
+    model->local_encoder = read_encoder(tensors, model->arch, "local.encoder");
+  }
   read_local_module(tensors, *model);
   read_fine_register(tensors, *model);
   tensors.refuse_others("paper");

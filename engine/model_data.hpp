@@ -15,6 +15,16 @@
 
 namespace vnreg::detail {
 
+/// The encoder (paper, section III-A). The first block of network 0 includes the linear layer
+/// `pre`.
+struct EncoderData {
+  kernels::EdgeBlock network0_first;
+  std::array<kernels::VnBlock, 2> network0_rest;
+  std::array<kernels::VnBlock, 2> network1;
+  kernels::PackedMatrix global_direction;
+  kernels::PackedMatrix global_fc;
+};
+
 struct ModelData {
   Architecture arch;
   std::optional<Calibration> calibration;  // of modes coarse and paper
@@ -25,14 +35,11 @@ struct ModelData {
   std::optional<DescriptorModel> descriptor_model;
   std::optional<JudgeModel> judge;
 
-  // Encoder (paper, section III-A). The first block of network 0 includes the linear layer `pre`.
-  kernels::EdgeBlock network0_first;
-  std::array<kernels::VnBlock, 2> network0_rest;
-  std::array<kernels::VnBlock, 2> network1;
-  kernels::PackedMatrix global_direction;
-  kernels::PackedMatrix global_fc;
+  EncoderData encoder;
 
-  // Local module (paper, section III-B).
+  // Local module (paper, section III-B). The encoder of its own is an ablation, as is a module
+  // without the invariant layer, whose frame is the identity.
+  std::optional<EncoderData> local_encoder;
   std::array<kernels::VnBlock, 2> network2;
   std::array<kernels::VnNormLayer, 2> invariant;
   kernels::PackedMatrix frame;

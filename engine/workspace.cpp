@@ -12,16 +12,19 @@ void allocate(Floats& buffer, Index size) { buffer.assign(static_cast<std::size_
 void allocate_encoder(const ModelData& model, Index points, Features& f) {
   const Index c = padded(model.arch.channels_global);
   const Index widest = std::max(c, padded(model.arch.channels_local));
-  const Index rows =
-      std::max({widest, model.network1[1].tail.hidden_rows(), model.network2[0].out_rows()});
+  const Index rows = std::max(
+      {widest, model.encoder.network1[1].tail.hidden_rows(), model.network2[0].out_rows()});
   allocate(f.edges, 9 * points);
   allocate(f.latent, 3 * c * points);
   allocate(f.other, 3 * widest * points);
   allocate(f.sums, 3 * rows * tile_count(points));
-  for (Floats* buffer : {&f.mean, &f.hidden_mean, &f.pooled, &f.direction, &f.global}) {
+  for (Floats* buffer :
+       {&f.mean, &f.hidden_mean, &f.pooled, &f.direction, &f.global, &f.local_global}) {
     allocate(*buffer, 3 * rows);
   }
-  for (const auto* blocks : {&model.network0_rest, &model.network1, &model.network2}) {
+  // An encoder of the local module's own has the same widths.
+  for (const auto* blocks :
+       {&model.encoder.network0_rest, &model.encoder.network1, &model.network2}) {
     for (const kernels::VnBlock& block : *blocks) f.constants.reserve(block);
   }
 }
@@ -31,7 +34,7 @@ void allocate_local(const ModelData& model, Index points, bool record, Features&
   allocate(f.significance, points);
   if (record) {
     allocate(f.local, 3 * model.network2[1].out_rows() * points);
-    allocate(f.frame, 3 * model.frame.padded_rows() * points);
+    allocate(f.frame, 3 * frame_rows * points);
   }
 }
 
@@ -69,8 +72,11 @@ void allocate_residual(Index points, ResidualBuffers& r) {
 }
 
 void allocate_encoder_scratch(const ModelData& model, ThreadScratch& s) {
-  s.block.reserve(model.network0_first.half, model.network0_first.tail, tile_points);
-  for (const auto* blocks : {&model.network0_rest, &model.network1, &model.network2}) {
+  const kernels::EdgeBlock& first = model.encoder.network0_first;
+  s.block.reserve(first.half, first.tail, tile_points);
+  // An encoder of the local module's own has the same widths.
+  for (const auto* blocks :
+       {&model.encoder.network0_rest, &model.encoder.network1, &model.network2}) {
     for (const kernels::VnBlock& block : *blocks) {
       s.block.reserve(block.half, block.tail, tile_points);
     }
@@ -86,7 +92,7 @@ void allocate_local_scratch(const ModelData& model, ThreadScratch& s) {
   for (std::size_t i = 0; i < 2; ++i) {
     allocate(s.invariant[i], model.invariant[i].out_rows() * columns);
   }
-  allocate(s.frame, model.frame.padded_rows() * columns);
+  allocate(s.frame, frame_rows * columns);
   allocate(s.products, 3 * l * tile_points);
   for (std::size_t i = 0; i < 3; ++i) {
     allocate(s.mlp[i], model.significance[i].padded_rows() * tile_points);

@@ -18,6 +18,9 @@ using kernels::Floats;
 /// Points per tile: a tile's features and a panel of weights stay in the L1 and L2 caches.
 inline constexpr Index tile_points = 32;
 
+/// Rows of a buffer that holds the three vectors of the invariant layer's frame.
+inline constexpr Index frame_rows = kernels::padded(3);
+
 constexpr Index tile_count(Index points) noexcept {
   return (points + tile_points - 1) / tile_points;
 }
@@ -33,6 +36,7 @@ struct Features {
   Floats hidden_mean;  // rows x 3
   kernels::VnBlockConstants constants;
   Floats pooled, direction, global;  // C x 3
+  Floats local_global;               // as global, by an encoder of the local module's own
   Floats local, frame;               // L rows and 3 vectors, kept only when stages are recorded
   Floats descriptors;                // D x N
   Floats significance;               // N

@@ -1,7 +1,8 @@
 """`vnreg-train`: build the data, train networks and the judge, export, evaluate.
 
 The way from nothing to a model of your own: build-data, train, export, train-judge, calibrate,
-golden, inspect. The way to figures: evaluate, report, gallery. Every command has its --help.
+golden, inspect. The way to figures: evaluate, report, gallery; to those of docs/paper.md: the
+paper-* commands. Every command has its --help.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import argparse
 
 from vnreg_train.evaluate.arguments import add_evaluation_commands
 from vnreg_train.export.commands import add_model_commands
+from vnreg_train.paper.arguments import add_paper_commands
 from vnreg_train.training.commands import add_training_commands
 
 
@@ -24,6 +26,7 @@ def parser() -> argparse.ArgumentParser:
     add_training_commands(commands)
     add_model_commands(commands)
     add_evaluation_commands(commands)
+    add_paper_commands(commands)
     return root
 
 

@@ -26,6 +26,8 @@ struct Widths {
   std::uint64_t significance[2] = {12, 8};
   std::uint64_t neighbours = 12;
   bool shared_direction = false;
+  bool shared_encoder = true;
+  bool invariant_layer = true;
   std::uint64_t fine_iterations = 3;
   std::uint64_t keep_divisor = 6;
   double rms_radius = 0.5;
@@ -83,6 +85,26 @@ class TensorMaker {
     matrix(name + ".fc1", out, hidden);
     if (in != out) matrix(name + ".shortcut", out, in);
   }
+  void encoder(const std::string& name, std::uint64_t channels) {
+    matrix(name + ".pre", 2 * channels, 3);
+    for (const char* part :
+         {".network0.0", ".network0.1", ".network0.2", ".network1.0", ".network1.1"}) {
+      block(name + part, 2 * channels, channels);
+    }
+    direction(name + ".global.relu", channels, channels);
+    matrix(name + ".global.fc", channels, channels);
+  }
+  void invariant_layer(std::uint64_t channels) {
+    for (int i = 0; i < 2; ++i) {
+      const std::string name = "local.invariant." + std::to_string(i);
+      const std::uint64_t in = i == 0 ? channels : channels / 2;
+      matrix(name + ".fc", in / 2, in);
+      direction(name + ".direction", in / 2, in);
+      add(name + ".scale", {in / 2}, 0.2f, 1.0f);
+      add(name + ".shift", {in / 2}, 0.1f);
+    }
+    matrix("local.invariant.2.fc", 3, channels / 4);
+  }
 
  private:
   ModelDraft& draft_;
@@ -137,24 +159,18 @@ inline ModelDraft random_model(const Widths& w = {}, std::uint64_t seed = 1) {
   };
   detail::TensorMaker make(draft, w.shared_direction, seed);
   const std::uint64_t c = w.global, l = w.local, d = w.descriptor, p = w.pair;
-  make.matrix("encoder.pre", 2 * c, 3);
-  for (const char* block : {"encoder.network0.0", "encoder.network0.1", "encoder.network0.2",
-                            "encoder.network1.0", "encoder.network1.1"}) {
-    make.block(block, 2 * c, c);
+  make.encoder("encoder", c);
+  if (!w.shared_encoder) {
+    draft.metadata["ablation.shared_encoder"] = false;
+    make.encoder("local.encoder", c);
   }
-  make.direction("encoder.global.relu", c, c);
-  make.matrix("encoder.global.fc", c, c);
   make.block("local.network2.0", 2 * c, l);
   make.block("local.network2.1", 2 * l, l);
-  for (int i = 0; i < 2; ++i) {
-    const std::string name = "local.invariant." + std::to_string(i);
-    const std::uint64_t in = i == 0 ? l : l / 2;
-    make.matrix(name + ".fc", in / 2, in);
-    make.direction(name + ".direction", in / 2, in);
-    make.add(name + ".scale", {in / 2}, 0.2f, 1.0f);
-    make.add(name + ".shift", {in / 2}, 0.1f);
+  if (w.invariant_layer) {
+    make.invariant_layer(l);
+  } else {
+    draft.metadata["ablation.invariant_layer"] = false;
   }
-  make.matrix("local.invariant.2.fc", 3, l / 4);
   make.linear("local.descriptor", d, 3 * l);
   make.linear("fine.significance.0", w.significance[0], d);
   make.linear("fine.significance.1", w.significance[1], w.significance[0]);

@@ -54,6 +54,29 @@ TEST_CASE("every tensor is needed, with its exact shape, and no other") {
   }
 }
 
+TEST_CASE("an ablation needs its own tensors and no others") {
+  const ModelDraft shared = random_model();
+  for (const bool encoder : {false, true}) {
+    const ModelDraft good = random_model({.shared_encoder = encoder, .invariant_layer = !encoder});
+    REQUIRE_NOTHROW(good.build());
+    const std::string switched = encoder ? "invariant_layer" : "shared_encoder";
+    ModelDraft full = good;
+    full.metadata["ablation." + switched] = true;
+    refused(full, encoder ? ErrorCode::missing_tensor : ErrorCode::wrong_architecture,
+            encoder ? "local.invariant.0.fc" : "local.encoder.");
+    ModelDraft number = good;
+    number.metadata["ablation." + switched] = 1.0;
+    refused(number, ErrorCode::wrong_architecture, "ablation." + switched);
+    for (const auto& [name, tensor] : good.tensors) {
+      if (shared.tensors.contains(name)) continue;
+      CAPTURE(name);
+      ModelDraft missing = good;
+      missing.tensors.erase(name);
+      refused(missing, ErrorCode::missing_tensor, name);
+    }
+  }
+}
+
 TEST_CASE("an identity shortcut has no tensor") {
   ModelDraft draft = random_model({.global = 8, .local = 16});
   REQUIRE(!draft.tensors.contains("local.network2.0.shortcut"));

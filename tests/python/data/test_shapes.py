@@ -128,7 +128,7 @@ def test_malformed_files_are_refused(tmp_path, change, message):
 
 
 def test_what_is_no_shape_set(tmp_path):
-    with pytest.raises(ShapesError, match=r"no test\*.h5 files and no <category>/test/\*.off"):
+    with pytest.raises(ShapesError, match=r"no test\*.h5 or ply_data_test\*.h5, no <category>"):
         load_shapes(tmp_path, "test")
     (tmp_path / "test.h5").write_bytes(b"not HDF5")
     with pytest.raises(ShapesError, match="not a readable HDF5 file"):

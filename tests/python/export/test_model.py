@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "training"))
 
 from tiny_run import tiny_config, train_steps, trainer
 
+from vnreg_train.export.import_model import import_model
 from vnreg_train.export.model import (
     config_from_metadata,
     export_golden,
@@ -74,11 +75,22 @@ def test_folded_batch_norm_equals_batch_norm() -> None:
     assert torch.allclose(bn(x), x * scale + shift)
 
 
-@pytest.mark.parametrize("switch", ["vector_neurons", "invariant_layer", "shared_encoder"])
-def test_ablations_are_not_exported(switch: str) -> None:
-    network = RegistrationNetwork(replace(tiny_config().network, **{switch: False}))
-    with pytest.raises(ValueError, match=switch):
+def test_a_network_without_vector_neurons_is_not_exported() -> None:
+    network = RegistrationNetwork(replace(tiny_config().network, vector_neurons=False))
+    with pytest.raises(ValueError, match="vector_neurons"):
         engine_tensors(network)
+
+
+@pytest.mark.parametrize("switch", ["invariant_layer", "shared_encoder"])
+def test_the_other_ablations_come_back_as_they_were(switch: str, tmp_path: Path) -> None:
+    config = replace(tiny_config().network, **{switch: False})
+    network = RegistrationNetwork(config).eval()
+    export_model(network, tmp_path / "ablation.vnr", "ablation")
+    again, metadata = import_model(tmp_path / "ablation.vnr")
+    assert metadata[f"ablation.{switch}"] is False
+    assert not getattr(again.config, switch)
+    for name, tensor in engine_tensors(network).items():
+        assert np.array_equal(tensor, engine_tensors(again)[name]), name
 
 
 def test_a_golden_file_holds_inputs_and_every_stage(checkpoint: Path, tmp_path: Path) -> None:

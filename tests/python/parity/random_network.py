@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from vnreg_train.networks.config import NetworkConfig
 from vnreg_train.networks.edges import edge_vectors, neighbour_mean
+from vnreg_train.networks.encoder import GlobalModule
 from vnreg_train.networks.fine import NormedLinear, gather_points
 from vnreg_train.networks.registration import RegistrationNetwork
 from vnreg_train.networks.vn import VNLinear
@@ -57,10 +58,11 @@ def _network_coordinates(clouds: NDArray[np.float64], rms_radius: float) -> Tens
 
 
 def _whiten_edges(network: RegistrationNetwork, edges: Tensor) -> None:
-    """Scales the first layer's columns, so that its three input vectors count alike."""
-    pre = network.extractor.global_module.pre
-    assert isinstance(pre, VNLinear)
-    pre.linear.weight.data /= edges.square().sum(2).mean((0, 1)).sqrt()
+    """Scales the first layers' columns, so that their three input vectors count alike."""
+    for module in network.extractor.modules():
+        if isinstance(module, GlobalModule):
+            assert isinstance(module.pre, VNLinear)
+            module.pre.linear.weight.data /= edges.square().sum(2).mean((0, 1)).sqrt()
 
 
 @torch.no_grad()
@@ -72,7 +74,7 @@ def _calibrate_batch_norms(network: RegistrationNetwork, points: Tensor, edges: 
         norm.reset_running_stats()
     network.train()
     latent, feature = network.extractor.global_module(edges)
-    descriptors = network.extractor.local_module(latent, feature)
+    descriptors = network.extractor.describe(edges, latent, feature)
     _, kept = network.fine.keep(descriptors)
     x, f = gather_points(points, kept), gather_points(descriptors, kept)
     network.fine.run(x[:2], x[2:], f[:2], f[2:])

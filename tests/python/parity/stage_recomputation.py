@@ -71,6 +71,9 @@ class StageRecomputation:
     def _describe(self, side: str) -> dict[str, Tensor]:
         local = self.network.extractor.local_module
         latent, feature = (self._vectors(f"{side}.{n}") for n in ("network0.block2", "global"))
+        own_encoder = self.network.extractor.local_encoder
+        if own_encoder is not None:  # of which nothing is recorded
+            latent, feature = own_encoder(self._vectors(f"{side}.edge"))
         expanded = feature.unsqueeze(1).expand_as(latent)
         v = self._vectors(f"{side}.network2.block1")
         products = v.transpose(-1, -2) @ self._vectors(f"{side}.frame")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from hypothesis import example, given, note, settings
@@ -34,6 +35,8 @@ CONFIGS = st.builds(
     fine_iterations=st.integers(1, 4),
     keep_divisor=st.integers(1, 8),
     input_rms_radius=st.sampled_from([0.0, 0.33, 1.0]),
+    shared_encoder=st.booleans(),
+    invariant_layer=st.booleans(),
 )
 NEARLY_EQUAL_SIGNIFICANCES = NetworkConfig(
     global_channels=4,
@@ -45,6 +48,9 @@ NEARLY_EQUAL_SIGNIFICANCES = NetworkConfig(
     fine_iterations=1,
     keep_divisor=1,
 )
+ABLATION = NetworkConfig(
+    global_channels=16, local_channels=12, neighbours=8, shared_encoder=False, invariant_layer=False
+)
 
 
 @settings(max_examples=EXAMPLES, deadline=None)
@@ -55,6 +61,8 @@ NEARLY_EQUAL_SIGNIFICANCES = NetworkConfig(
     noisy=st.booleans(),
 )
 @example(config=NEARLY_EQUAL_SIGNIFICANCES, seed=40, sizes=(64, 64), noisy=False)
+@example(config=ABLATION, seed=1, sizes=(130, 97), noisy=True)
+@example(config=replace(ABLATION, invariant_layer=True), seed=2, sizes=(90, 64), noisy=False)
 def test_every_stage_of_a_random_network(
     config: NetworkConfig, seed: int, sizes: tuple[int, int], noisy: bool
 ) -> None:

@@ -1,7 +1,12 @@
-"""ModelNet40 as its OFF meshes (paper, section IV-A); its HDF5 form is read by shapes.py."""
+"""ModelNet40 as its OFF meshes and as PointNet's samples of them (paper, section IV-A).
+
+The HDF5 form of the paper's authors is read by shapes.py.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +21,7 @@ from vnreg_train.data.mesh import (
     welded,
 )
 from vnreg_train.data.off import parse_off
-from vnreg_train.data.shapes import ShapesError, ShapeSet
+from vnreg_train.data.shapes import ShapesError, ShapeSet, load_h5
 
 SURFACE_POINTS = 16_384
 _CATEGORIES = """
@@ -47,6 +52,23 @@ def load_off_folder(path: Path, split: str, points: int | None = None) -> ShapeS
         names=tuple(f"{file.parent.parent.name}/{file.stem}" for file in files),
         categories=categories,
     )
+
+
+def load_ply_data(files: Sequence[Path], points: int | None = None, seed: int = 0) -> ShapeSet:
+    """Shapes of modelnet40_ply_hdf5_2048's files, which lie in the unit sphere, made ours.
+
+    Each is moved to the centre of its bounding box and divided by its longest side; categories are
+    those of shape_names.txt beside the files, where there is one. Raises ShapesError.
+    """
+    shapes = load_h5(files, points, queries=0, seed=seed)
+    low, high = shapes.surface.min(1, keepdims=True), shapes.surface.max(1, keepdims=True)
+    sides = (high - low).max(2, keepdims=True)
+    if not (sides > 0).all():
+        raise ShapesError(f"{files[0].parent}: a shape without extent")
+    surface = ((shapes.surface - (low + high) / 2) / sides).astype(np.float32)
+    names = files[0].parent / "shape_names.txt"
+    categories = tuple(names.read_text(encoding="utf-8").split()) if names.exists() else CATEGORIES
+    return replace(shapes, surface=surface, categories=categories)
 
 
 def _sampled(file: Path, points: int) -> Float32:

@@ -1,4 +1,4 @@
-"""A set of shapes in memory, and its loader for the three layouts on disk."""
+"""A set of shapes in memory, and its loader for the four layouts on disk."""
 
 from __future__ import annotations
 
@@ -84,14 +84,15 @@ def load_shapes(
     """The shapes of one split of the set at `path`, whichever layout it has.
 
     Layouts: a folder of {train,validation,test}.h5 files built by vnreg_train (or one such
-    file); a folder of the paper authors' ModelNet40 files, train*.h5 and test*.h5; or the
-    ModelNet40 folder of OFF meshes, ModelNet40/<category>/{train,test}/*.off.
+    file); a folder of the paper authors' ModelNet40 files, train*.h5 and test*.h5; PointNet's
+    ModelNet40 files, ply_data_{train,test}*.h5, which have no queries; or the ModelNet40 folder
+    of OFF meshes, ModelNet40/<category>/{train,test}/*.off.
     `points` and `queries` keep only that many surface points and queries per shape: one random
     set of columns, drawn from `seed`, the same for all shapes, as the authors do (who draw with
     repetition: some 20 of their 2,048 occur twice). None keeps all; queries = 0 reads none.
     Raises ShapesError.
     """
-    from vnreg_train.data.modelnet40 import load_off_folder
+    from vnreg_train.data.modelnet40 import load_off_folder, load_ply_data
 
     path = Path(path)
     if path.is_file():
@@ -99,11 +100,16 @@ def load_shapes(
     files = sorted(path.glob(f"{split}*.h5"))
     if files:
         return load_h5(files, points, queries, seed)
+    files = sorted(path.glob(f"ply_data_{split}*.h5"))
+    if files:
+        return load_ply_data(files, points, seed)
     if any(path.glob(f"*/{split}/*.off")):
         return load_off_folder(path, split, points)
     if any((path / "ModelNet40").glob(f"*/{split}/*.off")):
         return load_off_folder(path / "ModelNet40", split, points)
-    raise ShapesError(f"{path}: no {split}*.h5 files and no <category>/{split}/*.off meshes")
+    raise ShapesError(
+        f"{path}: no {split}*.h5 or ply_data_{split}*.h5, no <category>/{split}/*.off"
+    )
 
 
 def load_h5(

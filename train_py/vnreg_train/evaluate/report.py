@@ -121,7 +121,7 @@ def p0_table(results: Results) -> str:
             shares = [
                 results["rows"].get(f"P0/{setting}/{angle}", {}).get(method) for angle in ANGLES_DEG
             ]
-            cells = ["" if s is None else _share(s["plain"][LIMIT]) for s in shares]
+            cells = ["" if s is None else interval(s["plain"][LIMIT]) for s in shares]
             lines.append([setting, TITLES[method], *cells])
         lines.append([setting, "*the paper*", *(f"{x:g}" for x in PAPER_RECALL[setting])])
     return table(["setting", "method", *(f"θ = {angle}°" for angle in ANGLES_DEG)], lines)
@@ -130,7 +130,7 @@ def p0_table(results: Results) -> str:
 def halves_table(results: Results) -> str:
     row = results["rows"].get("P0/partial/180", {})
     lines = [
-        [TITLES[m], *(_share(row[m]["halves"][h]) for h in ("same", "opposite"))]
+        [TITLES[m], *(interval(row[m]["halves"][h]) for h in ("same", "opposite"))]
         for m in TITLES
         if m in row and set(row[m]["halves"]) == {"same", "opposite"}
     ]
@@ -174,7 +174,7 @@ def recall_table(results: Results, rows: Sequence[str], kind: str) -> str:
     lines = []
     for row in rows:
         of = results["rows"][row]
-        cells = [_share(of[m][kind][LIMIT]) if m in of else "" for m in methods]
+        cells = [interval(of[m][kind][LIMIT]) if m in of else "" for m in methods]
         lines.append([_short(row), *cells])
     return table(["row", *(TITLES[m] for m in methods)], lines)
 
@@ -394,7 +394,8 @@ def _short(row: str) -> str:
     return row.removeprefix("P1/") if row.startswith("P1/") else row
 
 
-def _share(found: Mapping[str, Any]) -> str:
+def interval(found: Mapping[str, Any]) -> str:
+    """A share in %, with its 95 % interval."""
     low, high = found["interval_95"]
     return f"{100 * found['recall']:.1f} ({100 * low:.1f}–{100 * high:.1f})"
 

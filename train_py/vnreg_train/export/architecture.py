@@ -104,6 +104,9 @@ def _paper_parameters(metadata: Metadata) -> dict[str, int]:
         parameters[name] = _index(metadata, f"channels.{name}", 1, _MOST)
     parameters["neighbours"] = _index(metadata, "neighbours", 1, 64)
     parameters["shared"] = int(_typed(metadata, "relu.shared_direction", bool))
+    for name in ("shared_encoder", "invariant_layer"):
+        key = f"ablation.{name}"
+        parameters[name] = int(_typed(metadata, key, bool)) if key in metadata else 1
     _index(metadata, "fine.iterations", 0, 16)
     parameters["divisor"] = _index(metadata, "fine.keep_divisor", 1, 64)
     return parameters
@@ -166,15 +169,15 @@ def _block(name: str, inputs: int, out: int, shared: int) -> Wanted:
         yield f"{name}.shortcut", (out, inputs)
 
 
-def _paper_tensors(c: int, p: Mapping[str, int]) -> Wanted:
-    local, d, pair, shared = p["local"], p["descriptor"], p["pair"], p["shared"]
-    yield "encoder.pre", (2 * c, 3)
-    for name in ("network0.0", "network0.1", "network1.0", "network0.2", "network1.1"):
-        yield from _block(f"encoder.{name}", 2 * c, c, shared)
-    yield "encoder.global.relu", (1 if shared else c, c)
-    yield "encoder.global.fc", (c, c)
-    yield from _block("local.network2.0", 2 * c, local, shared)
-    yield from _block("local.network2.1", 2 * local, local, shared)
+def _encoder(name: str, c: int, shared: int) -> Wanted:
+    yield f"{name}.pre", (2 * c, 3)
+    for block in ("network0.0", "network0.1", "network1.0", "network0.2", "network1.1"):
+        yield from _block(f"{name}.{block}", 2 * c, c, shared)
+    yield f"{name}.global.relu", (1 if shared else c, c)
+    yield f"{name}.global.fc", (c, c)
+
+
+def _invariant_layer(local: int, shared: int) -> Wanted:
     for index, inputs in enumerate((local, local // 2)):
         name, out = f"local.invariant.{index}", inputs // 2
         yield f"{name}.fc", (out, inputs)
@@ -182,6 +185,17 @@ def _paper_tensors(c: int, p: Mapping[str, int]) -> Wanted:
         yield f"{name}.scale", (out,)
         yield f"{name}.shift", (out,)
     yield "local.invariant.2.fc", (3, local // 4)
+
+
+def _paper_tensors(c: int, p: Mapping[str, int]) -> Wanted:
+    local, d, pair, shared = p["local"], p["descriptor"], p["pair"], p["shared"]
+    yield from _encoder("encoder", c, shared)
+    if not p["shared_encoder"]:
+        yield from _encoder("local.encoder", c, shared)
+    yield from _block("local.network2.0", 2 * c, local, shared)
+    yield from _block("local.network2.1", 2 * local, local, shared)
+    if p["invariant_layer"]:
+        yield from _invariant_layer(local, shared)
     yield from _linear("local.descriptor", d, 3 * local)
     yield from _linear("fine.significance.0", p["significance.0"], d)
     yield from _linear("fine.significance.1", p["significance.1"], p["significance.0"])

@@ -16,6 +16,7 @@ from torch import Tensor, nn
 from vnreg_train.export.architecture import check_architecture
 from vnreg_train.export.model import config_from_metadata
 from vnreg_train.model_file import MetadataValue, read_model
+from vnreg_train.networks.encoder import GlobalModule
 from vnreg_train.networks.fine import NormedLinear
 from vnreg_train.networks.registration import RegistrationNetwork
 from vnreg_train.networks.vn import VNLinear, VNLinearNormReLU, VNReLU, VNResNetBlock
@@ -45,21 +46,25 @@ def _block(name: str, block: nn.Module) -> Named:
             yield f"{name}.{part}", layer.linear.weight
 
 
-def _extractor(network: RegistrationNetwork) -> Named:
-    module, local = network.extractor.global_module, network.extractor.local_module
+def _encoder(name: str, module: GlobalModule) -> Named:
     assert isinstance(module.pre, VNLinear) and isinstance(module.global_fc, VNLinear)
-    assert isinstance(module.global_relu, VNReLU) and local.invariant is not None
-    yield "encoder.pre", module.pre.linear.weight
-    yield "encoder.global.relu", module.global_relu.direction.weight
-    yield "encoder.global.fc", module.global_fc.linear.weight
-    for name, blocks in (
-        ("encoder.network0", module.network0),
-        ("encoder.network1", module.network1),
-        ("local.network2", local.network2),
-    ):
-        for index, block in enumerate(blocks):
-            yield from _block(f"{name}.{index}", block)
-    for index, layer in enumerate(local.invariant):
+    assert isinstance(module.global_relu, VNReLU)
+    yield f"{name}.pre", module.pre.linear.weight
+    yield f"{name}.global.relu", module.global_relu.direction.weight
+    yield f"{name}.global.fc", module.global_fc.linear.weight
+    for part in ("network0", "network1"):
+        for index, block in enumerate(getattr(module, part)):
+            yield from _block(f"{name}.{part}.{index}", block)
+
+
+def _extractor(network: RegistrationNetwork) -> Named:
+    extractor, local = network.extractor, network.extractor.local_module
+    yield from _encoder("encoder", extractor.global_module)
+    if extractor.local_encoder is not None:
+        yield from _encoder("local.encoder", extractor.local_encoder)
+    for index, block in enumerate(local.network2):
+        yield from _block(f"local.network2.{index}", block)
+    for index, layer in enumerate(local.invariant or ()):
         name = f"local.invariant.{index}"
         if isinstance(layer, VNLinearNormReLU):
             yield f"{name}.fc", layer.fc.weight

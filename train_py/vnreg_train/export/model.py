@@ -16,12 +16,16 @@ from vnreg_train.networks.config import NetworkConfig
 from vnreg_train.networks.registration import RegistrationNetwork
 
 Metadata = dict[str, int | float | bool | str]
+ENGINE_ABLATIONS = ("shared_encoder", "invariant_layer")  # in a file only where false
 
 
 def network_metadata(config: NetworkConfig, name: str, points: int) -> Metadata:
     """The hyper-parameters of docs/design.md, section Tensors."""
     first, second = config.significance_channels
-    return {
+    ablations: Metadata = {
+        f"ablation.{name}": False for name in ENGINE_ABLATIONS if not getattr(config, name)
+    }
+    return ablations | {
         "arch": "paper",
         "name": name,
         "channels.global": config.global_channels,
@@ -55,6 +59,7 @@ def config_from_metadata(metadata: dict[str, Any]) -> NetworkConfig:
         fine_iterations=metadata["fine.iterations"],
         keep_divisor=metadata["fine.keep_divisor"],
         input_rms_radius=metadata["input.rms_radius"],
+        **{name: metadata.get(f"ablation.{name}", True) for name in ENGINE_ABLATIONS},
     )
 
 

@@ -92,6 +92,8 @@ class Reference:
         v = module.network1[1](with_pooled(v))
         feature = module.global_fc(module.global_relu(v.mean(1, keepdim=True))).squeeze(1)
         activations["global"] = feature.transpose(-1, -2)
+        if extractor.local_encoder is not None:
+            latent, feature = extractor.local_encoder(edges)
         expanded = feature.unsqueeze(1).expand_as(latent)
         v = local.network2[0](torch.cat([latent, expanded], dim=-1))
         activations["network2.block0"] = v.transpose(-1, -2)

@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from vnreg_train.networks.encoder import GlobalModule
 from vnreg_train.networks.fine import NormedLinear
 from vnreg_train.networks.registration import RegistrationNetwork
 from vnreg_train.networks.vn import VNLinear, VNLinearNormReLU, VNReLU, VNResNetBlock
@@ -35,25 +36,23 @@ def _block(name: str, block: nn.Module) -> Named:
         yield f"{name}.shortcut", block.shortcut.linear.weight
 
 
-def _encoder(network: RegistrationNetwork) -> Named:
-    module = network.extractor.global_module
+def _encoder(name: str, module: GlobalModule) -> Named:
     assert isinstance(module.pre, VNLinear) and isinstance(module.global_fc, VNLinear)
     assert isinstance(module.global_relu, VNReLU)
-    yield "encoder.pre", module.pre.linear.weight
+    yield f"{name}.pre", module.pre.linear.weight
     for index, block in enumerate(module.network0):
-        yield from _block(f"encoder.network0.{index}", block)
+        yield from _block(f"{name}.network0.{index}", block)
     for index, block in enumerate(module.network1):
-        yield from _block(f"encoder.network1.{index}", block)
-    yield "encoder.global.relu", module.global_relu.direction.weight
-    yield "encoder.global.fc", module.global_fc.linear.weight
+        yield from _block(f"{name}.network1.{index}", block)
+    yield f"{name}.global.relu", module.global_relu.direction.weight
+    yield f"{name}.global.fc", module.global_fc.linear.weight
 
 
 def _local(network: RegistrationNetwork) -> Named:
     module = network.extractor.local_module
     for index, block in enumerate(module.network2):
         yield from _block(f"local.network2.{index}", block)
-    assert module.invariant is not None
-    for index, layer in enumerate(module.invariant):
+    for index, layer in enumerate(module.invariant or ()):
         name = f"local.invariant.{index}"
         if isinstance(layer, VNLinearNormReLU):
             scale, shift = folded_batch_norm(layer.norm.bn)
@@ -84,14 +83,14 @@ def _mlp(name: str, layers: nn.Sequential) -> Named:
 def engine_tensors(network: RegistrationNetwork) -> dict[str, NDArray[np.float32]]:
     """All tensors of architecture `paper`; float32, row-major (out, in).
 
-    Raises ValueError for the ablations, which the engine does not run.
+    Raises ValueError for the ablations that the engine does not run.
     """
-    config = network.config
-    switches = ("vector_neurons", "invariant_layer", "shared_encoder")
-    off = [name for name in switches if not getattr(config, name)]
-    if off:
-        raise ValueError(f"cannot export an ablation: {', '.join(off)} = false")
-    named = [*_encoder(network), *_local(network)]
+    for name in ("vector_neurons", "weighted_centroids"):
+        if not getattr(network.config, name):
+            raise ValueError(f"cannot export an ablation: {name} = false")
+    named = [*_encoder("encoder", network.extractor.global_module), *_local(network)]
+    if network.extractor.local_encoder is not None:
+        named += _encoder("local.encoder", network.extractor.local_encoder)
     for part in ("significance", "pair", "similarity", "weight"):
         named += _mlp(f"fine.{part}", getattr(network.fine, part))
     return {

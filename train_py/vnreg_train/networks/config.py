@@ -21,10 +21,11 @@ class NetworkConfig:
     keep_divisor: int = 6  # hard elimination keeps N // keep_divisor points
     input_rms_radius: float = 0.0  # common r.m.s. radius of the input; 0 = coordinates as given
     decoder_width: int = 256
-    # Ablations of the paper's Table V. The engine runs the full network only.
+    # Ablations of the paper's Table V. The engine needs vector neurons.
     vector_neurons: bool = True
     invariant_layer: bool = True
     shared_encoder: bool = True
+    weighted_centroids: bool = True  # in the fine register's covariance too; torch only
 
     @property
     def equivariant(self) -> bool:

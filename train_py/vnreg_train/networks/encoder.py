@@ -67,8 +67,11 @@ class LocalModule(nn.Module):
         return self.network2[1](with_pooled(v))
 
     def frame(self, v: Tensor) -> Tensor:
-        """Z: three equivariant vectors per point, (B, N, 3 coordinates, 3 vectors)."""
-        assert self.invariant is not None
+        """Z: three vectors per point, (B, N, 3 coordinates, 3 vectors), equivariant ones unless the
+        invariant layer is off: the axes then, with which V Z^T is V.
+        """
+        if self.invariant is None:
+            return torch.eye(3, dtype=v.dtype).expand(*v.shape[:-2], 3, 3)
         for layer in self.invariant:
             v = layer(v)
         return v

@@ -58,6 +58,7 @@ class FineRegister(nn.Module):
         d, p = config.descriptor_channels, config.pair_channels
         self.iterations = config.fine_iterations
         self.keep_divisor = config.keep_divisor
+        self.weighted_centroids = config.weighted_centroids
         self.significance = mlp(d, *config.significance_channels, 1)
         self.pair = mlp(2 * d + 4, p, p)
         self.similarity = mlp(p, p, 1)
@@ -113,7 +114,9 @@ class FineRegister(nn.Module):
         weight = weight / (weight.sum(-1, keepdim=True) + 1e-8)
         matched = torch.gather(y, 1, match.unsqueeze(-1).expand(-1, -1, 3))
         with torch.no_grad():  # poses are not differentiated; losses act on the matching
-            rotation, translation = procrustes(x, matched, weight)
+            rotation, translation = procrustes(
+                x, matched, weight, weighted_centroids=self.weighted_centroids
+            )
         step = FineStep(similarity, match, weight_logit, weight, rotation, translation)
         return step, rotation, translation
 

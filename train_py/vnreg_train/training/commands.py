@@ -149,7 +149,8 @@ def train_stage(arguments: argparse.Namespace) -> None:
     config = _with_steps(load_config(arguments.config), arguments.stage, arguments.steps)
     if arguments.threads:
         config = replace(config, threads=arguments.threads)
-    shapes = load_shapes(Path(arguments.data or config.data.folder), "train")
+    folder = Path(arguments.data or config.data.folder)
+    shapes = load_shapes(folder, "train", points=config.data.surface_points or None)
     run = Path(arguments.run or Path("runs") / config.name)
     initial = Path(arguments.initial) if arguments.initial else None
     validation = validation_shapes(arguments, config, config.data.folder)

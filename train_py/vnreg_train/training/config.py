@@ -23,6 +23,7 @@ class DataConfig:
 
     folder: str = "data/furniture"
     points: int = 1024
+    surface_points: int = 0  # only so many of each shape's, the same ones always; 0 = all
     queries: int = 2048
     # Neighbours at this density; 0 = the network's. Half the points and half the neighbours cover
     # the same surface, so a network trained on 512 points with 10 runs on 1,024 with 20.
@@ -57,7 +58,7 @@ class StageConfig(OptimisationConfig):
     registration_weight: float = 10.0
     occupancy_weight: float = 0.1  # of the sum over 2,048 queries
     consistency_weight: float = 0.0  # ours: whitened distance of the paired global features
-    scaled_start: bool = False  # ours: initial weights scaled on data; equivariant networks only
+    scaled_start: bool = False  # ours: initial weights scaled on data
     gradient_limit: float = 0.0  # ours: largest gradient of one pair's Procrustes; 0 = none
     tested_share: float = 0.0  # ours: share of the pairs matched between points kept as at test
     matching_weight: float = 1.0  # of the fine register's losses

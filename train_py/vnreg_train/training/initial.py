@@ -34,7 +34,8 @@ def scale_initial_weights(extractor: FeatureExtractor, edges: Tensor) -> None:
     hooks = []
     for module in extractor.modules():
         if isinstance(module, GlobalModule):
-            module.pre.linear.weight.div_(input_size)  # type: ignore[union-attr,operator]
+            weight: Tensor = module.pre.linear.weight  # type: ignore[union-attr,assignment]
+            weight.div_(input_size.repeat(weight.shape[1] // 3))
         if isinstance(module, VNResNetBlock):
             module.fc1.linear.reset_parameters()  # type: ignore[union-attr,operator]
         if isinstance(module, nn.Linear) and "bias" not in dict(module.named_parameters()):

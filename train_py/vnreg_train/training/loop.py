@@ -88,6 +88,10 @@ class Trainer(ABC, Generic[NetworkT, BatchT]):
     def _validate(self) -> dict[str, float]:
         """Figures of the averaged weights on shapes that are not trained on; {} without such."""
 
+    def _speed(self, pairs_per_second: float) -> dict[str, float]:
+        """The figures of throughput."""
+        return {"pairs_per_second": pairs_per_second}
+
     @property
     def checkpoint(self) -> Path:
         return self.run_folder / f"{self.name}.pt"
@@ -175,5 +179,5 @@ class Trainer(ABC, Generic[NetworkT, BatchT]):
         optimiser = {"learning_rate": rate, "gradient_norm": norm, "skipped": float(self.skipped)}
         curves.add("optimiser", optimiser, self.step)
         curves.add("weights", weight_figures(self.network, self.average.module), self.step)
-        curves.add("speed", {"pairs_per_second": pairs_per_second}, self.step)
+        curves.add("speed", self._speed(pairs_per_second), self.step)
         return figures

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 from pathlib import Path
 
 import torch
@@ -12,6 +13,7 @@ from vnreg_train.data.shapes import ShapeSet
 from vnreg_train.networks.registration import RegistrationNetwork
 from vnreg_train.training.batches import Batch, BatchSequence
 from vnreg_train.training.config import StageConfig, TrainingConfig
+from vnreg_train.training.flops import pair_gflop
 from vnreg_train.training.initial import scale_initial_weights
 from vnreg_train.training.loop import Losses, Trainer, begin_run
 from vnreg_train.training.stage_validation import validate_stage
@@ -90,6 +92,15 @@ class StageTrainer(Trainer[RegistrationNetwork, Batch]):
             self.network.extractor.global_module.eval()
             self.network.decoder.eval()
         return self.module(batch)
+
+    @cached_property
+    def _pair_gflop(self) -> float:
+        return pair_gflop(self.config, self.stage)
+
+    def _speed(self, pairs_per_second: float) -> dict[str, float]:
+        """Also GFLOP/s, of the matrix products alone."""
+        gflops = self._pair_gflop * pairs_per_second
+        return super()._speed(pairs_per_second) | {"gflop_per_second": gflops}
 
     def _validate(self) -> dict[str, float]:
         if self.validation is None:
