@@ -19,7 +19,8 @@ SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python test-isa soak \
         viewer viewer-three viewer-picture \
         check sanitize analyse valgrind stress fuzz fuzzers fuzz-builds fuzz-coverage \
-        bench bench-compare batch-kills evaluate gallery train train-paper data model docs wheel clean
+        bench bench-compare batch-kills evaluate gallery train train-paper data \
+        paper paper-train paper-recall paper-ablation paper-speed paper-page model docs wheel clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -153,6 +154,34 @@ train: data ## train models/vnreg.vnr's network from the start (hours); resumes
 train-paper: data ## train models/small.vnr's network, the paper's, from the start (hours); resumes
 	$(PY) -m vnreg_train.cli train small --stage coarse
 	$(PY) -m vnreg_train.cli train small --stage fine
+
+# docs/paper.md, part by part; each resumes, and can be called alone.
+PAPER := runs/paper
+paper: paper-train paper-recall paper-ablation paper-speed paper-page ## train the paper's network (hours) and reproduce its tables, into docs/paper.md; resumes
+
+paper-train: train-paper
+	mkdir -p $(PAPER)
+	$(PY) -m vnreg_train.cli export runs/small/fine.pt $(PAPER)/small.vnr --name small
+	$(PY) -m vnreg_train.cli export runs/small/fine.pt $(PAPER)/longer.vnr --name longer \
+	  --keep-divisor 3 --fine-iterations 10
+
+paper-recall: python data
+	$(PY) -m vnreg_train.cli evaluate --rows p0 --methods coarse paper --paper-model $(PAPER)/small.vnr \
+	  --run $(PAPER)/evaluate --jobs 2
+	$(PY) -m vnreg_train.cli paper-recall --run $(PAPER)/evaluate
+	$(PY) -m vnreg_train.cli evaluate --rows 'P0/*/180' --methods paper --run $(PAPER)/longer \
+	  --paper-model $(PAPER)/longer.vnr --jobs 2
+	$(PY) -m vnreg_train.cli paper-recall --run $(PAPER)/longer --longer $(PAPER)/longer.vnr
+
+paper-ablation: python data
+	$(PY) -m vnreg_train.cli paper-ablation --run $(PAPER)/ablation
+
+paper-speed: python
+	$(PY) -m vnreg_train.cli paper-speed
+	$(PY) -m vnreg_train.cli paper-training-speed
+
+paper-page: setup
+	$(PY) -m vnreg_train.cli paper-page
 
 $(VENV)/.peers: requirements/evaluate.txt $(VENV)/.installed
 	$(call install_debian,$(PEERS_DEBIAN))

@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "training"))
 
 from tiny_run import tiny_config, train_steps, trainer
 
+from vnreg_train.cli import parser
 from vnreg_train.export.import_model import import_model
 from vnreg_train.export.model import (
     config_from_metadata,
@@ -73,6 +74,14 @@ def test_folded_batch_norm_equals_batch_norm() -> None:
     x = torch.randn(7, 5, dtype=torch.float64)
     scale, shift = folded_batch_norm(bn)
     assert torch.allclose(bn(x), x * scale + shift)
+
+
+def test_the_fine_register_may_be_set_otherwise(checkpoint: Path, tmp_path: Path) -> None:
+    words = ["export", str(checkpoint), str(tmp_path / "longer.vnr")]
+    arguments = parser().parse_args([*words, "--fine-iterations", "7", "--keep-divisor", "2"])
+    arguments.run_command(arguments)
+    metadata, _ = read_model(tmp_path / "longer.vnr")
+    assert (metadata["fine.iterations"], metadata["fine.keep_divisor"]) == (7, 2)
 
 
 def test_a_network_without_vector_neurons_is_not_exported() -> None:

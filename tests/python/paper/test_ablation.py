@@ -60,7 +60,7 @@ def test_lines_differ_in_what_they_say() -> None:
     assert set(VARIANTS) == {*TABLE_V, *ADDITIONS}
 
 
-@pytest.mark.parametrize("name", ["neither", "vectors", "both", BASE])
+@pytest.mark.parametrize("name", ["neither", "vectors", "both", "last_weights"])
 def test_a_line_is_trained_and_measured_once(name: str, pairing: Pairing, tmp_path: Path) -> None:
     results = ablation.run_ablation(short_config(), tmp_path, pairing, [name])
     of = results[name]

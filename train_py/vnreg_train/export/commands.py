@@ -60,6 +60,10 @@ def _add_export(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--provenance", nargs="*", default=[], metavar="KEY=TEXT", help="notes kept in the file"
     )
+    command.add_argument(
+        "--fine-iterations", type=int, help="the paper's network only, instead of the configured"
+    )
+    command.add_argument("--keep-divisor", type=int, help="likewise: match a cloud's N-th part")
     command.set_defaults(run_command=export_model_file)
 
 
@@ -85,15 +89,20 @@ def _add_inspect(command: argparse.ArgumentParser) -> None:
 
 
 def export_model_file(arguments: argparse.Namespace) -> None:
-    from vnreg_train.export.checkpoint import export_checkpoint
+    from vnreg_train.export.checkpoint import checkpoint_arch, export_checkpoint
 
-    extra = dict(pair.split("=", 1) for pair in arguments.provenance)
+    checkpoint = Path(arguments.checkpoint)
+    notes = dict(pair.split("=", 1) for pair in arguments.provenance)
+    asked = {"iterations": arguments.fine_iterations, "keep_divisor": arguments.keep_divisor}
+    settings = {f"fine.{key}": value for key, value in asked.items() if value is not None}
+    if settings and checkpoint_arch(checkpoint) != "paper":
+        raise SystemExit("vnreg-train export: this network has no fine register")
     export_checkpoint(
-        Path(arguments.checkpoint),
+        checkpoint,
         Path(arguments.out),
         arguments.name,
         points=arguments.points,
-        extra={f"provenance.{key}": value for key, value in extra.items()},
+        extra={f"provenance.{key}": value for key, value in notes.items()} | settings,
     )
 
 

@@ -129,9 +129,11 @@ def read_curves(run: Path, stage: str) -> dict[str, list[list[float]]]:
     """Of each figure of a stage's training, about CURVE_POINTS means as [last step, mean]."""
     events = EventAccumulator(str(run / "tensorboard" / stage), size_guidance={"scalars": 0})
     events.Reload()
+    known = events.Tags()["scalars"]
     curves = {}
     for name in CURVES[stage]:
-        points = events.Scalars(f"train/{name}")
+        # Runs of the first version have no groups.
+        points = events.Scalars(f"train/{name}" if f"train/{name}" in known else name)
         parts = np.array_split(np.arange(len(points)), min(CURVE_POINTS, len(points)))
         curves[name] = [
             [points[part[-1]].step, float(np.mean([points[i].value for i in part]))]

@@ -21,8 +21,10 @@ ABLATION = Lesson(
 )
 RECALL = Lesson(
     summary="collect the recall of modes coarse and paper for docs/paper.md",
-    reads="The answers of `vnreg-train evaluate --rows p0 --methods coarse paper --run RUN`.",
-    writes="OUT/recall.json.",
+    reads="The answers of `vnreg-train evaluate --rows p0 --methods coarse paper --run RUN`, and "
+    "the curves of the network's training.",
+    writes="OUT/recall.json and OUT/curve.json; with --longer OUT/longer.json alone, of a model "
+    "whose fine register was set to more points and iterations by `export`.",
     takes="Seconds.",
     example="paper-recall --run runs/paper/evaluate",
 )
@@ -59,6 +61,8 @@ def add_paper_commands(commands: Subcommands) -> None:
     ablation.add_argument("--variants", nargs="+", help="only these (default: all)")
     recall = _add(commands, "paper-recall", RECALL, _recall)
     recall.add_argument("--run", default="runs/paper/evaluate", help="folder of the answers")
+    recall.add_argument("--trained", default="runs/small", help="folder of the network's training")
+    recall.add_argument("--longer", metavar="MODEL", help="the model file, if it is that one")
     _add_pairs(recall)
     speed = _add(commands, "paper-speed", SPEED, _speed)
     speed.add_argument("--rounds", type=int, default=41, help="alignments by each network")
@@ -119,6 +123,8 @@ def _recall(arguments: argparse.Namespace) -> None:
     from vnreg_train.evaluate.results import collect_results
     from vnreg_train.evaluate.run import Pairing
     from vnreg_train.evaluate.symmetry import read_symmetries
+    from vnreg_train.model_file import read_model
+    from vnreg_train.paper.ablation import STAGES, read_curves
 
     pairing = Pairing(arguments.split, None, 0, Path(arguments.data))
     results = collect_results(Path(arguments.run), pairing, read_symmetries())
@@ -128,7 +134,14 @@ def _recall(arguments: argparse.Namespace) -> None:
         for row, methods in results["rows"].items()
     }
     figures = {"about": results["about"], "methods": results["methods"], "rows": rows}
+    if arguments.longer:
+        metadata, _ = read_model(Path(arguments.longer))
+        keys = ("fine.iterations", "fine.keep_divisor")
+        _write(arguments, "longer", figures | {"settings": {k: metadata[k] for k in keys}})
+        return
     _write(arguments, "recall", figures)
+    trained = Path(arguments.trained)
+    _write(arguments, "curve", {stage: read_curves(trained, stage) for stage in STAGES})
 
 
 def _speed(arguments: argparse.Namespace) -> None:

@@ -37,6 +37,7 @@ def make_register(network: RegistrationNetwork, model_path: Path) -> Register:
     """Through the engine from a file written to `model_path`, else by the torch reference."""
     if not runs_in_engine(network):
         return _by_reference(Reference(network))
+    model_path.parent.mkdir(parents=True, exist_ok=True)
     export_model(network, model_path, "ablation")
     return _by_engine(vnreg.Registrar(vnreg.Model.load(model_path), mode="paper", threads=1))
 
