@@ -163,7 +163,7 @@ paper-train: train-paper
 	mkdir -p $(PAPER)
 	$(PY) -m vnreg_train.cli export runs/small/fine.pt $(PAPER)/small.vnr --name small
 	$(PY) -m vnreg_train.cli export runs/small/fine.pt $(PAPER)/longer.vnr --name longer \
-	  --keep-divisor 3 --fine-iterations 10
+	  --keep-divisor 3 --fine-iterations 16
 
 paper-recall: python data
 	$(PY) -m vnreg_train.cli evaluate --rows p0 --methods coarse paper --paper-model $(PAPER)/small.vnr \

@@ -40,7 +40,8 @@ def markdown(figures: Figures, notes: str) -> str:
     parts = [
         "# The paper's tables",
         "What the paper claims, trained here and run by the engine. `make paper` writes this page "
-        "from the figures in [paper/](paper); each part can be run alone (`make help`).",
+        "from its figures, [recall.json](paper/recall.json) and others beside it; each part can be "
+        "made alone (see the Makefile).",
     ]
     sections = (
         ("recall", "Recall", recall_section),
