@@ -22,10 +22,14 @@ def state(page: Page) -> dict[str, Any]:
     return found
 
 
-def picture(page: Page) -> Pixels:
-    """(height, width, 3) 0..1: the canvas, all points drawn, without what is written over it."""
+def picture(page: Page, draw_all: bool = True) -> Pixels:
+    """(height, width, 3) 0..1: the canvas without what is written over it.
+
+    draw_all: with all points, at once; else as it is.
+    """
     page.add_style_tag(content="#legend, #note { display: none }")
-    page.evaluate("() => { vnregViewer.drawAll(); return new Promise(requestAnimationFrame); }")
+    if draw_all:
+        page.evaluate("() => { vnregViewer.drawAll(); return new Promise(requestAnimationFrame); }")
     image = Image.open(io.BytesIO(page.locator("#canvas").screenshot()))
     return np.asarray(image.convert("RGB"), np.float64) / 255
 
