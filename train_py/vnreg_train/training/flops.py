@@ -14,9 +14,11 @@ def pair_gflop(config: TrainingConfig, stage: str) -> float:
     """GFLOP (a multiplication and an addition are two) for one pair of a stage's training.
 
     As torch would execute it, uncompiled; what is not a matrix product is left out. Counted on
-    tensors without data, so it takes no time to speak of.
+    tensors without data, so it takes no time to speak of, and draws no random numbers: the run
+    that asks goes on with its own.
     """
-    network = RegistrationNetwork(config.network).to("meta")
+    with torch.device("meta"):
+        network = RegistrationNetwork(config.network)
     points = config.data.points
     edges = torch.zeros(2, points, 3, 3, device="meta")
     with FlopCounterMode(display=False) as counter:
