@@ -18,7 +18,7 @@ SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python test-isa soak \
         viewer viewer-three viewer-picture \
-        check sanitize analyse valgrind stress fuzz fuzzers fuzz-builds fuzz-coverage \
+        check sanitize tsan coverage tidy analyse valgrind stress fuzz fuzzers fuzz-builds fuzz-coverage \
         bench bench-compare batch-kills evaluate gallery train train-paper data \
         paper paper-train paper-recall paper-ablation paper-speed paper-page model docs wheel clean
 
@@ -103,10 +103,30 @@ check: setup ## formatting, lints, types
 	$(PY) -m ruff format --check train_py python tests/python tests/soak bench examples docs viewer
 	$(PY) -m mypy train_py/vnreg_train python/vnreg/_batch
 
+# The same build as the fuzz targets'.
 sanitize: debian-packages ## the C++ tests under address and undefined-behaviour sanitizers
-	cmake --preset asan-ubsan > /dev/null
-	cmake --build --preset asan-ubsan
-	ctest --preset asan-ubsan
+	$(call install_debian,$(FUZZ_DEBIAN))
+	cmake --preset fuzz > /dev/null
+	cmake --build --preset sanitize
+	ctest --preset sanitize
+
+# Of clang, whose OpenMP tells the sanitizer where threads meet (libarcher); GCC's does not.
+tsan: debian-packages ## the C++ tests under the thread sanitizer
+	$(call install_debian,$(FUZZ_DEBIAN))
+	cmake --preset tsan > /dev/null
+	cmake --build --preset tsan
+	ctest --preset tsan
+
+coverage: debian-packages ## the lines of engine, kernels and model format that the C++ tests cover
+	$(call install_debian,$(FUZZ_DEBIAN))
+	cmake --preset coverage > /dev/null
+	cmake --build --preset coverage
+	tests/coverage.sh build/coverage
+
+tidy: debian-packages ## clang-tidy over the C++ code
+	$(call install_debian,clang-tidy-14 libomp-14-dev)
+	cmake --preset debug > /dev/null
+	run-clang-tidy-14 -quiet -p build/debug '/(model_format|kernels|engine|cli)/[^/]*\.cpp$$'
 
 analyse: debian-packages ## static analysis of the C++ code by cppcheck
 	$(call install_debian,cppcheck)

@@ -81,9 +81,11 @@ Vector turn(const float* r, const Vector& v) noexcept {
 float inner_product(const kernels::Floats& a, std::size_t i, const kernels::Floats& b,
                     std::size_t j, Index stride) noexcept {
   const auto n = static_cast<std::size_t>(stride);
+  const float* left = a.data() + i * n;
+  const float* right = b.data() + j * n;
   float sum = 0;
 #pragma omp simd reduction(+ : sum)
-  for (std::size_t k = 0; k < n; ++k) sum += a[i * n + k] * b[j * n + k];
+  for (Index k = 0; k < stride; ++k) sum += left[k] * right[k];
   return sum;
 }
 

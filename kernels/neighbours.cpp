@@ -1,6 +1,7 @@
 #include "kernels/neighbours.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 
 #include "kernels/list_within.hpp"
@@ -118,15 +119,19 @@ std::int32_t count_within(const float* squared, Index count, float limit) noexce
   return within;
 }
 
-/// The smallest distance above `limit`.
+// Smallest distances are taken by their bits, which are ordered like numbers from 0 on: OpenMP's
+// least float32 starts at the largest finite number with some compilers and at infinity with others.
+std::int32_t bits_of(float squared) noexcept { return std::bit_cast<std::int32_t>(squared); }
+
+/// The smallest distance above `limit`, or infinity.
 float next_above(const float* squared, Index count, float limit) noexcept {
-  float next = infinity;
+  std::int32_t next = bits_of(infinity);
 #pragma omp simd reduction(min : next)
   for (Index i = 0; i < count; ++i) {
-    const float candidate = squared[i] > limit ? squared[i] : infinity;
+    const std::int32_t candidate = bits_of(squared[i] > limit ? squared[i] : infinity);
     next = candidate < next ? candidate : next;
   }
-  return next;
+  return std::bit_cast<float>(next);
 }
 
 /// The k nearest: all points closer than `limit`, and of those at `limit` the ones whose index is
@@ -228,17 +233,17 @@ Point sum_offsets(const Point& q, const Selection& nearest, const Candidates& c)
   return {sum_x, sum_y, sum_z};
 }
 
-/// The smallest distance to a point other than `own`.
+/// The smallest distance to a point other than `own`, or infinity.
 float nearest_other(std::int32_t own, const Candidates& c) noexcept {
   const float* squared = c.squared.data();
   const std::int32_t* original = c.original.data();
-  float nearest = infinity;
+  std::int32_t nearest = bits_of(infinity);
 #pragma omp simd reduction(min : nearest)
   for (Index i = 0; i < c.count; ++i) {
-    const float candidate = original[i] == own ? infinity : squared[i];
+    const std::int32_t candidate = bits_of(original[i] == own ? infinity : squared[i]);
     nearest = candidate < nearest ? candidate : nearest;
   }
-  return nearest;
+  return std::bit_cast<float>(nearest);
 }
 
 /// For each point of a leaf the smallest squared distance to the points offered.
