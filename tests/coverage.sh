@@ -10,7 +10,7 @@ LLVM_PROFILE_FILE="$PWD/profiles/%p.profraw" ctest --output-on-failure \
 llvm-profdata-14 merge -sparse profiles/*.profraw -o tests.profdata
 rm -r profiles
 objects=()
-while read -r test; do objects+=(-object "$test"); done < <(find tests/cpp -type f -name 'test_*' -perm -u+x)
+while read -r test; do objects+=(-object "$test"); done < <(find . -maxdepth 1 -type f -name 'test_*' -perm -u+x)
 for part in engine kernels model_format; do
   echo "$part: lines, missed, covered"
   mapfile -t files < <(find "$root/$part" -name '*.cpp' ! -path '*/reference/*')
