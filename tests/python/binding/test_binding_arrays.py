@@ -93,10 +93,12 @@ def peak_of_align(source: Array, model: vnreg.Model) -> int:
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_numbers_at_any_distance_are_not_copied(dtype: type, model: vnreg.Model) -> None:
     wide = np.random.default_rng(0).normal(size=(200_000, 8)).astype(dtype)
-    assert peak_of_align(wide[:, 2:5], model) < 100_000
-    assert peak_of_align(wide[::2, 2:5], model) < 100_000
-    assert peak_of_align(wide[:, 0:6:2], model) < 100_000
-    assert peak_of_align(np.asfortranarray(wide)[:, :3], model) < 100_000
+    # Less than half of the least copy; not much less, because other threads of this process count.
+    least = 600_000
+    assert peak_of_align(wide[:, 2:5], model) < least
+    assert peak_of_align(wide[::2, 2:5], model) < least
+    assert peak_of_align(wide[:, 0:6:2], model) < least
+    assert peak_of_align(np.asfortranarray(wide)[:, :3], model) < least
     assert peak_of_align(wide[::-1, 2:5], model) > 200_000 * 3 * 8
 
 

@@ -122,9 +122,10 @@ def stub_members() -> dict[str, ast.stmt]:
 
 def runtime_members() -> set[str]:
     names = set()
-    for name in set(vnreg.__all__) - {"__version__"}:
+    for name, thing in vars(vnreg._vnreg).items():
+        if name.startswith("__") or not callable(thing):
+            continue
         names.add(name)
-        thing = getattr(vnreg, name)
         if isinstance(thing, type) and thing is not vnreg.Error:
             names |= {f"{name}.{member}" for member in vars(thing) if not member.startswith("_")}
     return names
