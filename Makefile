@@ -90,9 +90,9 @@ viewer: ## viewer/view.js, the script of the viewer's page, from viewer/src
 	$(call install_debian,esbuild)
 	viewer/make_view.sh
 
-viewer-three: ## viewer/three.js from the npm package `three`; needs npm
+viewer-three: ## viewer/third_party/three.js from the npm package `three`; needs npm
 	$(call install_debian,esbuild)
-	viewer/make_three.sh
+	viewer/third_party/make_three.sh
 
 viewer-picture: demo setup ## docs/viewer.webp, the demo's pair as the viewer shows it
 	$(call install_debian,$(VIEWER_DEBIAN))

@@ -12,6 +12,6 @@ vnreg_page_\name\()_end:
     .section .rodata
     part html, page.html
     part style, style.css
-    part three, three.js
+    part three, third_party/three.js
     part script, view.js
     .section .note.GNU-stack, "", %progbits
