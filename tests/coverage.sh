@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
 # Lines of the engine, the kernels and the model format that the C++ tests cover, by llvm-cov.
+# Left out: the suite `allocation`, because clang's OpenMP allocates where GCC's does not, and
+# `looks`, whose milliseconds are those of an optimised build.
 # usage: tests/coverage.sh BUILD [LEAST]; fails below LEAST percent (default 85).
 set -euo pipefail
 least=${2:-85}
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$1"
 LLVM_PROFILE_FILE="$PWD/profiles/%p.profraw" ctest --output-on-failure \
-  -R '^(kernels|model_format|engine|allocation|looks)$'
+  -R '^(kernels|model_format|engine)$'
 llvm-profdata-14 merge -sparse profiles/*.profraw -o tests.profdata
 rm -r profiles
 objects=()
