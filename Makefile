@@ -126,7 +126,7 @@ coverage: debian-packages ## the lines of engine, kernels and model format that 
 tidy: debian-packages ## clang-tidy over the C++ code
 	$(call install_debian,clang-tidy-14 libomp-14-dev)
 	cmake --preset debug > /dev/null
-	run-clang-tidy-14 -quiet -p build/debug '/(model_format|kernels|engine|cli)/[^/]*\.cpp$$'
+	run-clang-tidy-14 -clang-tidy-binary clang-tidy-14 -quiet -p build/debug '/(model_format|kernels|engine|cli)/[^/]*\.cpp$$'
 
 analyse: debian-packages ## static analysis of the C++ code by cppcheck
 	$(call install_debian,cppcheck)

@@ -21,7 +21,8 @@ ROOT = Path(__file__).resolve().parents[3]
 MUG = ROOT / "examples" / "data"
 Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
 
-# Of viewer/third_party/three.js, which make_three.sh beside it makes.
+THREE = ROOT / "viewer" / "third_party" / "three.js"
+# make_three.sh beside it makes this one.
 THREE_SHA256 = "166d94e979ab3c240483c233626c528c290d9c87fe6c1108a6298772ba579d55"
 
 
@@ -117,14 +118,14 @@ def test_shown_points_are_the_clouds_own(mug: Pair) -> None:
 
 def test_the_page_asks_for_nothing(mug: Pair) -> None:
     template = vnreg.view_template()
-    own = template.replace((ROOT / "viewer" / "third_party" / "three.js").read_text(encoding="utf-8"), "")
+    own = template.replace(THREE.read_text(encoding="utf-8"), "")
     assert len(own) < 100_000
     assert not re.search(r"https?://|\bsrc=|@import|fetch\(|XMLHttpRequest", own)
     assert "The MIT License" in template and "three.js authors" in template
 
 
 def test_three_js_is_the_one_that_was_reviewed() -> None:
-    content = (ROOT / "viewer" / "third_party" / "three.js").read_bytes()
+    content = THREE.read_bytes()
     assert hashlib.sha256(content).hexdigest() == THREE_SHA256
     assert b"</script" not in content
 
