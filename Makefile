@@ -124,9 +124,10 @@ coverage: debian-packages ## the lines of engine, kernels and model format that 
 	tests/coverage.sh build/coverage
 
 tidy: debian-packages ## clang-tidy over the C++ code
-	$(call install_debian,clang-tidy-14 libomp-14-dev)
-	cmake --preset debug > /dev/null
-	run-clang-tidy-14 -clang-tidy-binary clang-tidy-14 -quiet -p build/debug '/(model_format|kernels|engine|cli)/[^/]*\.cpp$$'
+	$(call install_debian,clang-tidy-14 $(FUZZ_DEBIAN))
+	cmake --preset coverage > /dev/null
+	run-clang-tidy-14 -clang-tidy-binary clang-tidy-14 -quiet -p build/coverage \
+	  '^$(CURDIR)/(model_format|kernels|engine|cli|viewer)/.*\.cpp$$'
 
 analyse: debian-packages ## static analysis of the C++ code by cppcheck
 	$(call install_debian,cppcheck)
