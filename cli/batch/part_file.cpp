@@ -7,19 +7,10 @@
 #include <cstdio>
 #include <cstring>
 
+#include "cloud_file/whole_file.hpp"
 #include "command.hpp"
 
 namespace vnreg::cli {
-
-bool write_fully(int descriptor, std::string_view bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return false;
-    bytes.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return true;
-}
 
 PartFile::PartFile(const std::string& path) : path_(path), part_(path + ".part") {
   descriptor_ = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
@@ -39,7 +30,7 @@ void PartFile::fail_with(std::string_view expected) const {
 }
 
 void PartFile::write(std::string_view bytes) {
-  if (!write_fully(descriptor_, bytes)) fail_with("room for the file");
+  if (!cloud_file::write_fully(descriptor_, bytes)) fail_with("room for the file");
 }
 
 void PartFile::finish() {

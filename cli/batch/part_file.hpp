@@ -30,7 +30,4 @@ class PartFile {
   int descriptor_ = -1;
 };
 
-/// Writes all of `bytes`; false (see errno) where it cannot.
-bool write_fully(int descriptor, std::string_view bytes);
-
 }  // namespace vnreg::cli

@@ -8,7 +8,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "batch/part_file.hpp"
+#include "cloud_file/whole_file.hpp"
 #include "command.hpp"
 
 namespace vnreg::cli {
@@ -80,7 +80,7 @@ void RowJournal::truncate(std::size_t size) {
 }
 
 void RowJournal::add(std::string_view lines) {
-  if (!write_fully(descriptor_, lines)) {
+  if (!cloud_file::write_fully(descriptor_, lines)) {
     const int error = errno;
     // Whoever reads the file meets whole rows only; if even this fails, the next run does it.
     [[maybe_unused]] const int ignored = ::ftruncate(descriptor_, static_cast<off_t>(size_));

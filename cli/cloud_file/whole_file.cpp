@@ -28,12 +28,7 @@ class TemporaryFile {
   TemporaryFile& operator=(const TemporaryFile&) = delete;
 
   void write(std::string_view bytes) {
-    while (!bytes.empty()) {
-      const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) fail_with("room for the file");
-      bytes.remove_prefix(static_cast<std::size_t>(written));
-    }
+    if (!write_fully(descriptor_, bytes)) fail_with("room for the file");
   }
 
   void rename_to(const std::string& destination) {
@@ -76,6 +71,16 @@ std::string resolve(const std::string& path) {
 }
 
 }  // namespace
+
+bool write_fully(int descriptor, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
 
 void write_whole_file(const std::string& path, std::initializer_list<std::string_view> parts) {
   try {

@@ -11,4 +11,7 @@ namespace vnreg::cloud_file {
 /// followed; only files are replaced. Throws CloudFileError, whose text begins with the path.
 void write_whole_file(const std::string& path, std::initializer_list<std::string_view> parts);
 
+/// Writes all of `bytes` to an open file; false (see errno) where it cannot.
+bool write_fully(int descriptor, std::string_view bytes);
+
 }  // namespace vnreg::cloud_file

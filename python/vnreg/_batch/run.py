@@ -42,7 +42,10 @@ class Job:
     @staticmethod
     def of(*, model: Any, part_rows: int, read_attempts: int, **options: Any) -> Job:
         """Reads the model. Raises Error, OSError, ValueError before anything is started."""
-        content = None if model is None else fsspec.open(str(model), "rb").open().read()
+        content = None
+        if model is not None:
+            with fsspec.open(str(model), "rb") as file:
+                content = file.read()
         vnreg.Registrar(load_model(content), **options)
         for name, value in (("part_rows", part_rows), ("read_attempts", read_attempts)):
             if value < 1:

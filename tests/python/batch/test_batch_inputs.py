@@ -129,7 +129,7 @@ def test_pairs_that_come_twice_are_two_rows(
 
 
 def test_arrays_and_objects_go_in(client: Client, clouds: list[Path], tmp_path: Path) -> None:
-    trimesh = pytest.importorskip("trimesh")
+    trimesh = pytest.importorskip("trimesh", reason="requirements/demo.txt is not installed")
     points = [np.load(path) for path in clouds[:2]]
     pairs = [(points[0], points[1]), (trimesh.PointCloud(points[0]), str(clouds[1]))]
     vnreg.batch(pairs, tmp_path, address=client)

@@ -142,7 +142,7 @@ def test_nothing_is_started_for_a_bad_model_or_option(clouds: list[Path], tmp_pa
     """Errors come at once, and no folder appears."""
     pairs, output = pairs_of(clouds, 1), tmp_path / "out"
     with pytest.raises(vnreg.Error, match="mode"):
-        vnreg.batch(pairs, output, mode="best")  # type: ignore[arg-type]
+        vnreg.batch(pairs, output, mode="best")  # type: ignore[arg-type]  # refused is what is tested
     with pytest.raises(vnreg.Error, match="max_points"):
         vnreg.batch(pairs, output, max_points=3)
     with pytest.raises(vnreg.Error):

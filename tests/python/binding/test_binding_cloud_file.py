@@ -53,7 +53,7 @@ def test_a_broken_file_is_a_value_error() -> None:
     with pytest.raises(ValueError, match="^line 2: expected "):
         vnreg.parse_cloud(b"1 2 3\n4 5\n")
     with pytest.raises(TypeError):
-        vnreg.parse_cloud("1 2 3\n")  # type: ignore[arg-type]
+        vnreg.parse_cloud("1 2 3\n")  # type: ignore[arg-type]  # text, not bytes
 
 
 def test_read_cloud_names_the_file(tmp_path: Path) -> None:
