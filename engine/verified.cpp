@@ -10,6 +10,7 @@
 #include "engine/match_hypotheses.hpp"
 #include "engine/refine.hpp"
 #include "engine/rigid.hpp"
+#include "engine/shared_points.hpp"
 #include "engine/stopwatch.hpp"
 #include "engine/verify.hpp"
 
@@ -56,6 +57,13 @@ constexpr RefineStage polish = {everything, 1.0f, 8, Search::exact};
 constexpr double doubtful_log_odds = -2;
 constexpr double doubtful_fit = 0.05;
 constexpr double clear_gain = 0.02;
+// What the log-odds of a pose gain by points that both clouds hold, if it brings about as many of
+// them together as the best does: more than two poses of one pair ever differ by. That surroundings
+// and places are the same to the last digits is no accident. Half of them count as all: of samples
+// that are symmetric themselves, each symmetry brings its own, and which of them were encoded is
+// chance.
+constexpr double shared_log_odds = 20;
+constexpr double about_as_many = 0.5;
 // Poses closer than this count as one answer.
 constexpr double alternative_degrees = 15;
 constexpr float alternative_radii = 0.1f;
@@ -249,6 +257,37 @@ bool doubtful(const ScoredPose* poses, Index count, bool judged) noexcept {
                       [&](const ScoredPose& pose) { return pose.score >= least; });
 }
 
+/// The pose that the points tell that both clouds hold, if there are enough of them.
+Index add_shared_pose(Index count, ScoredPose* poses, Workspace& w) noexcept {
+  VerifiedWorkspace& v = w.verified;
+  find_shared_points(w.descriptors.features[0].out, w.descriptors.features[1].out, v.shared);
+  if (const auto motion = shared_motion(v.radius, v.shared)) {
+    poses[count++] = {in_units(*motion, 1 / v.radius), 0};
+  }
+  return count;
+}
+
+/// Adds to log-odds what shared points say.
+void favour_shared_points(ScoredPose* poses, Index count, VerifiedWorkspace& v) noexcept {
+  Index together[final_poses];
+  for (Index i = 0; i < count; ++i) {
+    together[i] = brought_together(in_units(poses[i].transform, v.radius), v.radius, v.shared);
+  }
+  const Index most = count > 0 ? *std::max_element(together, together + count) : 0;
+  if (most < least_shared_points) return;
+  for (Index i = 0; i < count; ++i) {
+    const double share = static_cast<double>(together[i]) / static_cast<double>(most);
+    poses[i].score += shared_log_odds * std::min(share / about_as_many, 1.0);
+  }
+}
+
+/// The pose of the answer: by the points that both clouds hold, or else by the surfaces.
+RigidTransform polished(const RigidTransform& pose, VerifiedWorkspace& v) noexcept {
+  const auto shared = shared_motion_near(in_units(pose, v.radius), v.radius, v.shared);
+  if (shared) return in_units(*shared, 1 / v.radius);
+  return refine(pose, v.surface, scaled(polish, v.spacing));
+}
+
 }  // namespace
 
 VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::uint64_t seed,
@@ -264,6 +303,7 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
   }
   const bool described = !v.match.motions.empty();
   if (described) {
+    given = add_shared_pose(given, poses, w);
     const Index from_matches = propose_from_matches(w);
     times.hypotheses = watch.lap();
     count = settle(gather_match_hypotheses(from_matches, v), given, poses, w);
@@ -284,6 +324,7 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
     result.judged = judge_poses(poses, count, w);
   }
   record_judgement(fits, count, w);
+  if (result.judged) favour_shared_points(poses, count, v);
   std::copy_n(poses, count, v.considered);
   w.reached.considered = count;
   count =
@@ -292,7 +333,7 @@ VerifiedPoses register_verified(std::span<const RigidTransform> proposals, std::
       count > 0 ? poses[0].score - gaps_below(poses[0].score, result.judged).alternative : 0;
   for (Index i = 0; i < count && poses[i].score >= least; ++i) {
     if (!w.deadline.passed()) {
-      poses[i].transform = refine(poses[i].transform, v.surface, scaled(polish, v.spacing));
+      poses[i].transform = polished(poses[i].transform, v);
     }
     result.pose[result.count++] = {in_units(orthonormal(poses[i].transform), v.radius),
                                    poses[i].score};

@@ -7,6 +7,7 @@
 #include "engine/judge_workspace.hpp"
 #include "engine/match_buffers.hpp"
 #include "engine/motion.hpp"
+#include "engine/shared_points.hpp"
 #include "engine/surface.hpp"
 
 namespace vnreg::detail {
@@ -20,6 +21,8 @@ inline constexpr Index draws_per_chunk = 16;
 inline constexpr Index kept_per_chunk = 64;
 /// Poses that other registers may add to the hypotheses.
 inline constexpr Index most_proposals = 2;
+/// With that of shared points.
+inline constexpr Index most_given = most_proposals + 1;
 /// Distinct hypotheses that are refined.
 inline constexpr Index refined_poses = 40;
 /// Distinct poses that are refined on all points.
@@ -57,6 +60,7 @@ struct VerifiedWorkspace {
   float spacing = 0;  // of the sparser surface, in that unit
   PairTable table;
   MatchBuffers match;    // empty without descriptors
+  SharedPoints shared;   // empty without descriptors
   JudgeWorkspace judge;  // empty without descriptors
   /// kept_per_chunk of each chunk, and behind those that are found, those from matches.
   std::vector<Hypothesis> hypotheses;

@@ -119,8 +119,9 @@ struct StageTimes {
 struct Alternative {
   Pose T_target_source = identity_pose;  ///< target = T * source, in the units of the input
   /// What poses are ranked by. Of a model with a judge: its log-odds that the pose is right, before
-  /// calibration. Else how far each cloud's surface lies on the other's, less what contradicts the
-  /// pose: at most 1, of identical surfaces.
+  /// calibration, and up to 20 more for points that both clouds hold to the last digits. Else how
+  /// far each cloud's surface lies on the other's, less what contradicts the pose: at most 1, of
+  /// identical surfaces.
   double score = 0;
 };
 
