@@ -72,6 +72,20 @@ def test_crops_keep_a_half_space_of_three_quarters(random_shapes):
     assert 0.2 < (spread < 0.3).mean() < 0.9
 
 
+@pytest.mark.parametrize("diagonal_crops", [0.0, 1.0])
+def test_crops_are_along_the_diagonal_as_often_as_asked(random_shapes, diagonal_crops) -> None:
+    """What a crop along (1, 1, 1) leaves ends at a plane across it; other crops do not."""
+    batch = sampler(random_shapes, "partial", batch=20, diagonal_crops=diagonal_crops).batch(0)
+    cut = []
+    for source, target in zip(batch["source"], batch["target"], strict=True):
+        both = np.concatenate([source, target]) @ np.ones(3)
+        ends = [(cloud @ np.ones(3)).min() > both.min() + 0.02 for cloud in (source, target)]
+        ends += [(cloud @ np.ones(3)).max() < both.max() - 0.02 for cloud in (source, target)]
+        shared = common(source, target)
+        cut.append(shared == N or (sum(ends) == 2 and abs(shared - 2 / 3 * N) <= 1))
+    assert (np.mean(cut) == 1) == (diagonal_crops == 1)
+
+
 def test_an_epoch_is_every_shape_once_in_random_order(random_shapes):
     one = sampler(random_shapes, batch=3)
     order = np.concatenate([one.shape_indices(k) for k in range(10)])

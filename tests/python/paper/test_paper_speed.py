@@ -14,8 +14,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "training"))
 from tiny_run import tiny_config
 
 from vnreg_train.networks.registration import RegistrationNetwork
-from vnreg_train.paper.speed import measure_encoders
+from vnreg_train.paper.speed import measure_encoders, measure_lines
 from vnreg_train.paper.training_speed import Recipe, measure_recipe, random_batch
+from vnreg_train.paper.variants import VARIANTS
 from vnreg_train.training.flops import pair_gflop
 from vnreg_train.training.stages import CoarseStage, FineStage, JointStage
 
@@ -44,3 +45,13 @@ def test_two_encoders_take_longer_than_one() -> None:
     found = measure_encoders(network, rounds=5)
     assert found["rounds"] == 5 and found["ratio"] > 1.1
     assert math.isclose(found["ratio"], found["ms"]["two"] / found["ms"]["shared"])
+
+
+def test_every_line_of_the_ablation_is_timed() -> None:
+    """By the engine where it runs the line; one encoder is faster than two."""
+    found = measure_lines(tiny_config(), rounds=1)
+    assert set(found) == set(VARIANTS)
+    by_torch_alone = {name for name, of in found.items() if of["engine"] is None}
+    assert by_torch_alone == {"neither", "invariant", "plain_centroids"}
+    assert all((of["torch"] or 0) > 0 for of in found.values())
+    assert found["tested_candidates"] == found["shared"] != found["both"]

@@ -52,3 +52,22 @@ def test_the_true_pose_leaves_no_residual() -> None:
     assert float(translation.abs().max()) == 0
     vectors = torch.eye(3).expand(2, 3, 3)
     assert torch.allclose(batch.turned(vectors), batch.rotation)
+
+
+def test_queries_that_are_not_centred_meet_the_features_where_the_cloud_stands() -> None:
+    """As in the authors' code: the target's translation moves its features, not its queries."""
+    clouds = sample()
+    clouds["source"] = clouds["source"][:, :30] + 0.5
+    turns = Rotation.random(2, rng=np.random.default_rng(1)).as_matrix()
+    moves = np.array([[0.1, 0.2, 0.3], [0.0, -0.4, 0.0]])
+    centred = make_batch(clouds, 4, 0.33, apart=turns)
+    plain = make_batch(clouds, 4, 0.33, apart=turns, moves=moves)
+    assert centred.places is None and plain.places is not None
+    assert centred.queries is not None and plain.queries is not None
+    assert torch.equal(centred.edges, plain.edges)
+    # A query and a feature keep their offset, but for the target's move.
+    offset = plain.places.unsqueeze(1) - plain.queries + centred.queries
+    assert torch.allclose(offset[:2], torch.zeros(2, 5, 3), atol=1e-5)
+    lengths = offset[2:].norm(dim=2) / torch.from_numpy(np.linalg.norm(moves, axis=1))[:, None]
+    assert torch.allclose(lengths, lengths[:, :1].expand(2, 5), rtol=1e-4)  # one scale a pair
+    assert float(lengths.min()) > 0.1

@@ -15,7 +15,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from tiny_run import STEPS, bent_boxes, tiny_config, train_steps, trainer
 
 from vnreg_train.data.shapes import ShapeSet
-from vnreg_train.training.config import TrainingConfig, load_config
+from vnreg_train.training.config import OptimisationConfig, TrainingConfig, load_config
+from vnreg_train.training.loop import one_cycle
 from vnreg_train.training.train import StageTrainer
 
 
@@ -63,6 +64,23 @@ def test_the_loop_stops_saves_and_goes_on(tmp_path: Path) -> None:
     again.run(progress=False)
     assert again.step == STEPS
     assert list((tmp_path / "tensorboard" / "coarse").glob("events*"))
+
+
+@pytest.mark.parametrize("steps", [1, 2, 19, 20, 21, 200])
+def test_a_schedule_of_any_length_rises_and_falls(steps: int) -> None:
+    """Of 20 steps it would rise for just one, and torch's would divide by zero."""
+    settings = OptimisationConfig(steps=steps, learning_rate=1.0, warmup=0.05)
+    optimizer = torch.optim.SGD([torch.nn.Parameter(torch.zeros(1))], lr=1.0)
+    schedule = one_cycle(optimizer, settings)
+    rates = []
+    for _ in range(steps):
+        rates.append(schedule.get_last_lr()[0])
+        optimizer.step()
+        schedule.step()
+    assert all(0 < rate <= 1 for rate in rates)
+    peak = rates.index(max(rates))
+    assert peak <= 0.05 * steps
+    assert rates[peak:] == sorted(rates[peak:], reverse=True)
 
 
 def test_the_second_stage_leaves_the_global_module_alone(tmp_path: Path) -> None:
@@ -169,3 +187,16 @@ def test_every_ablation_trains(tmp_path: Path, switch: str) -> None:
     coarse.save()
     fine = trainer(tmp_path, "fine", config)
     assert all(math.isfinite(f["loss"]) for f in train_steps(fine, 2))
+
+
+def test_occupancy_that_is_not_centred_trains_another_network(tmp_path: Path) -> None:
+    config = tiny_config()
+    found = []
+    for centred in (True, False):
+        changed = replace(config, coarse=replace(config.coarse, centred_occupancy=centred))
+        run = trainer(tmp_path / str(centred), "coarse", changed)
+        figures = train_steps(run, 2)
+        assert all(math.isfinite(f["occupancy"]) for f in figures)
+        found.append(figures[0])
+    assert found[0]["registration"] == found[1]["registration"]
+    assert found[0]["occupancy"] != found[1]["occupancy"]

@@ -20,7 +20,6 @@ from vnreg_train.data.shapes import ShapeSet
 
 MAX_SIGMA = 0.015
 SCALE_RANGE = (0.7, 1.3)
-DIAGONAL_CHANCE = 0.5
 DIAGONAL = np.full(3, 3.0**-0.5)
 
 
@@ -50,7 +49,9 @@ class TrainingSampler:
     points: N per cloud, after a crop (which keeps 75 % of a pool of int(N / 0.75)). batch: B.
     settings_mix: weight of each setting of SETTINGS. queries: Q occupancy queries per pair, of
     those the shapes have; 0 for none. augment: scale each axis by U[0.7, 1.3], then back to
-    longest side 1. An epoch is every shape once, in random order; batches run across its end.
+    longest side 1. diagonal_crops: share of the crops that are along +-(1, 1, 1), as the authors'
+    code crops; the others' directions are uniform on the sphere. An epoch is every shape once, in
+    random order; batches run across its end.
     """
 
     def __init__(
@@ -62,9 +63,10 @@ class TrainingSampler:
         seed: int,
         queries: int = 2048,
         augment: bool = False,
+        diagonal_crops: float = 0.5,
     ) -> None:
         self.shapes, self.points, self.batch_size = shapes, points, batch
-        self.seed, self.augment = seed, augment
+        self.seed, self.augment, self.diagonal_crops = seed, augment, diagonal_crops
         self.queries = queries if shapes.queries is not None else 0
         self.next_batch = 0
         self._names, self._chances = _checked_mix(settings_mix)
@@ -121,6 +123,7 @@ class TrainingSampler:
             "batch": self.batch_size,
             "queries": self.queries,
             "augment": self.augment,
+            "diagonal_crops": self.diagonal_crops,
             "mix": dict(zip(self._names, map(float, self._chances), strict=True)),
             "shapes": stable_seed(*self.shapes.names),
         }
@@ -141,8 +144,9 @@ class TrainingSampler:
         pool = int(self.points / KEPT_SHARE) if setting.partial else self.points
         clouds = _two_samples(self.shapes.surface[row], pool, setting.shared, rng)
         sigma = rng.uniform(0.0, MAX_SIGMA) if setting.noisy else 0.0
+        crops = self.diagonal_crops if setting.partial else None
         source, target = (
-            _finished(cloud * scale, self.points, setting.partial, sigma, rng) for cloud in clouds
+            _finished(cloud * scale, self.points, crops, sigma, rng) for cloud in clouds
         )
         pair = {"source": source, "target": target}
         if self.queries and self.shapes.queries is not None:
@@ -202,11 +206,15 @@ def _two_samples(
 
 
 def _finished(
-    cloud: Float64, points: int, partial: bool, sigma: float, rng: np.random.Generator
+    cloud: Float64,
+    points: int,
+    diagonal_crops: float | None,
+    sigma: float,
+    rng: np.random.Generator,
 ) -> Float32:
-    """The cloud cropped to `points` where partial, made noisy, and in random order."""
-    if partial:
-        depth = cloud @ _crop_direction(rng)
+    """The cloud cropped to `points` unless that is None, made noisy, and in random order."""
+    if diagonal_crops is not None:
+        depth = cloud @ _crop_direction(diagonal_crops, rng)
         cloud = cloud[np.argpartition(depth, len(cloud) - points)[len(cloud) - points :]]
     if sigma > 0:
         noise = rng.normal(0.0, sigma, cloud.shape)
@@ -214,8 +222,8 @@ def _finished(
     return rng.permutation(cloud).astype(np.float32)
 
 
-def _crop_direction(rng: np.random.Generator) -> Float64:
-    """Along +-(1, 1, 1), as the authors' code crops, or uniform on the sphere, evenly often."""
-    if rng.random() < DIAGONAL_CHANCE:
+def _crop_direction(diagonal_crops: float, rng: np.random.Generator) -> Float64:
+    """Along +-(1, 1, 1) in so large a share of the cases, else uniform on the sphere."""
+    if rng.random() < diagonal_crops:
         return np.asarray(DIAGONAL * rng.choice([-1.0, 1.0]))
     return random_direction(rng)

@@ -21,7 +21,13 @@ OURS = ("coarse", "paper")
 MODE_TITLES = {"coarse": "**ours**, coarse", "paper": "**ours**, coarse + fine"}
 PEERS = ("verified", "open3d_ransac_icp", "open3d_fgr_icp", "kiss_matcher_icp", "small_gicp")
 TABLE_V = ("neither", "invariant", "vectors", "both", BASE)
-ADDITIONS = ("fixed_samples", "tested_candidates", "last_weights", "plain_centroids")
+ADDITIONS = (
+    "fixed_samples",
+    "tested_candidates",
+    "uncentred_occupancy",
+    "last_weights",
+    "plain_centroids",
+)
 
 
 def read_figures(folder: Path, results: Path) -> dict[str, Any]:
@@ -170,6 +176,7 @@ def ablation_section(figures: Figures) -> str:
         "torch reference registers.",
         ablation_table(found, TABLE_V),
         order_sentence(found),
+        lines_speed(figures["speed"]),
         "Ours, one at a time, against *both, shared encoder*:",
         ablation_table(found, (BASE, *ADDITIONS)),
         "Learning curves, means over tenths of the training (registration loss of the coarse "
@@ -204,6 +211,23 @@ def order_sentence(found: Figures) -> str:
     same = max(neither, invariant) < vectors < min(both, shared)
     verdict = "met" if same else "missed"
     return f"Order as in the paper (neither and invariant < vectors < both): **{verdict}**."
+
+
+def lines_speed(found: Figures) -> str:
+    """Pairs/s of the paper's lines, ours beside the paper's; of our additions where they differ."""
+    lines = []
+    for name in (*TABLE_V, "plain_centroids"):
+        of, paper = found["lines"][name], VARIANTS[name].paper_pairs_per_second
+        engine = "not run" if of["engine"] is None else f"{of['engine']:.1f}"
+        rate = "" if paper is None else f"{paper:g}"
+        lines.append([VARIANTS[name].title, engine, f"{of['torch']:.1f}", rate])
+    return (
+        f"Pairs/s of each line at the paper's width (C = 128, {found['points']:,} points, random "
+        f"weights, one thread of an {found['cpu']}, in turns, medians of processor times); the "
+        "torch reference, which is plain and not fast, for the lines that the engine does not run. "
+        "Lines that differ in their training alone are as fast as *both, shared encoder*.\n\n"
+        + table(["", "engine", "torch reference", "the paper, Titan RTX"], lines)
+    )
 
 
 def curves_table(found: Figures) -> str:

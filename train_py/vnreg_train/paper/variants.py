@@ -68,6 +68,9 @@ VARIANTS = {
     "tested_candidates": Variant(
         "with candidates as at test time", {"fine": {"tested_share": 0.5}}
     ),
+    "uncentred_occupancy": Variant(
+        "without centred occupancy", {"coarse": {"centred_occupancy": False}}
+    ),
     "last_weights": Variant("without averaged weights", trained_as=BASE, averaged=False),
     "plain_centroids": Variant(
         "without weighted centroids", trained_as=BASE, weighted_centroids=False

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
-from vnreg_train.data.protocol import random_pose
+from vnreg_train.data.protocol import MAX_TRANSLATION, random_pose
 from vnreg_train.data.resample import TrainingSampler
 from vnreg_train.networks.edges import edge_vectors, neighbour_mean_kdtree
 
@@ -33,6 +33,7 @@ class Batch:
     occupancies: Tensor | None  # (2B, Q)
     translation: Tensor  # (B, 3): target = rotation source + translation, network coordinates
     rotation: Tensor | None = None  # (B, 3, 3); None is the identity
+    places: Tensor | None = None  # (2B, 3): where queries that are not centred see the features
 
     def residual(self, rotation: Tensor, translation: Tensor) -> tuple[Tensor, Tensor]:
         """What separates a pose from the true one: R_gt^T R (B, 3, 3) and t - t_gt (B, 3)."""
@@ -67,10 +68,14 @@ def make_batch(
     rms_radius: float,
     rotation: NDArray[np.float64] | None = None,
     apart: NDArray[np.float64] | None = None,
+    moves: NDArray[np.float64] | None = None,
 ) -> Batch:
     """Centres, scales and finds the edges.
 
     Optionally turns each pair by `rotation` and its target once more by `apart`, (B, 3, 3) both.
+    moves: None, and queries are centred as their cloud is; or translations (B, 3) of the target,
+    and queries stay in the shape's frame (the authors' code): features meet them where the cloud
+    stands, the target's cloud moved and its queries not.
     """
     clouds = {k: np.asarray(v, dtype=np.float64) for k, v in sample.items() if k != "occupancies"}
     if rotation is not None:
@@ -83,11 +88,16 @@ def make_batch(
         y, shift = y @ apart.transpose(0, 2, 1), shift @ apart.transpose(0, 2, 1)
     points = np.concatenate([x / scale, y / scale]).astype(np.float32)
     means = torch.from_numpy(neighbour_mean_kdtree(points, neighbours))
-    queries = occupancies = None
+    queries = occupancies = places = None
     if "queries" in clouds:
-        around_s, around_t = ((clouds["queries"] - c) / scale for c in (centre_s, centre_t))
+        origins = (centre_s, centre_t) if moves is None else (0.0, 0.0)
+        around_s, around_t = ((clouds["queries"] - origin) / scale for origin in origins)
         if apart is not None:
             around_t = around_t @ apart.transpose(0, 2, 1)
+        if moves is not None:
+            turned = centre_t if apart is None else centre_t @ apart.transpose(0, 2, 1)
+            stand = np.concatenate([centre_s / scale, (turned + moves[:, None]) / scale])
+            places = torch.from_numpy(stand[:, 0].astype(np.float32))
         queries = torch.from_numpy(np.concatenate([around_s, around_t]).astype(np.float32))
         occupancies = torch.from_numpy(np.tile(sample["occupancies"], (2, 1)).astype(np.float32))
     return Batch(
@@ -97,6 +107,7 @@ def make_batch(
         occupancies=occupancies,
         translation=torch.from_numpy(shift[:, 0].astype(np.float32)),
         rotation=None if apart is None else torch.from_numpy(apart.astype(np.float32)),
+        places=places,
     )
 
 
@@ -111,6 +122,7 @@ class BatchSequence(Dataset[Batch]):
         turn: bool,
         steps: int,
         apart: bool = False,
+        move: bool = False,
     ) -> None:
         self.sampler = sampler
         self.neighbours = neighbours
@@ -118,6 +130,7 @@ class BatchSequence(Dataset[Batch]):
         self.turn = turn
         self.steps = steps
         self.apart = apart
+        self.move = move
 
     def __len__(self) -> int:
         return self.steps
@@ -130,7 +143,10 @@ class BatchSequence(Dataset[Batch]):
         apart = None
         if self.apart:
             apart = np.stack([random_pose(rng, 180.0)[:3, :3] for _ in range(count)])
-        return make_batch(sample, self.neighbours, self.rms_radius, rotation, apart)
+        moves = None
+        if self.move:
+            moves = rng.uniform(-MAX_TRANSLATION, MAX_TRANSLATION, (count, 3))
+        return make_batch(sample, self.neighbours, self.rms_radius, rotation, apart, moves)
 
     def loader(self, start: int) -> DataLoader[Batch]:
         """Batches start, start + 1, … made by one worker process ahead of the training.

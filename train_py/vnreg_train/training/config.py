@@ -29,6 +29,7 @@ class DataConfig:
     # the same surface, so a network trained on 512 points with 10 runs on 1,024 with 20.
     neighbours: int = 0
     anisotropic: bool = False  # random scale per axis
+    diagonal_crops: float = 0.5  # share of the crops along +-(1, 1, 1); others: any direction
     settings: dict[str, float] = field(default_factory=lambda: {"independent": 1.0})
 
 
@@ -57,6 +58,7 @@ class StageConfig(OptimisationConfig):
     bfloat16: bool = False
     registration_weight: float = 10.0
     occupancy_weight: float = 0.1  # of the sum over 2,048 queries
+    centred_occupancy: bool = True  # ours; False: the decoder sees each cloud where it stands
     consistency_weight: float = 0.0  # ours: whitened distance of the paired global features
     scaled_start: bool = False  # ours: initial weights scaled on data
     gradient_limit: float = 0.0  # ours: largest gradient of one pair's Procrustes; 0 = none

@@ -11,6 +11,7 @@ from typing import Generic, TypeVar, cast
 
 import torch
 from torch import Tensor, nn
+from torch.optim import Optimizer
 from torch.optim.lr_scheduler import OneCycleLR
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from tqdm import tqdm
@@ -32,6 +33,18 @@ def begin_run(config: RunConfig) -> None:
     """Threads and seed; call before the network is made."""
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
+
+
+def one_cycle(optimizer: Optimizer, settings: OptimisationConfig) -> OneCycleLR:
+    """The rate of every step. A rise of just one step is left out: torch divides by its end, 0."""
+    rises = settings.warmup * settings.steps != 1
+    return OneCycleLR(
+        optimizer,
+        max_lr=settings.learning_rate,
+        total_steps=settings.steps,
+        pct_start=settings.warmup if rises else 0.0,
+        cycle_momentum=False,
+    )
 
 
 class Trainer(ABC, Generic[NetworkT, BatchT]):
@@ -58,13 +71,7 @@ class Trainer(ABC, Generic[NetworkT, BatchT]):
         self.optimizer = torch.optim.AdamW(
             parameters, lr=settings.learning_rate, weight_decay=settings.weight_decay
         )
-        self.schedule = OneCycleLR(
-            self.optimizer,
-            max_lr=settings.learning_rate,
-            total_steps=settings.steps,
-            pct_start=settings.warmup,
-            cycle_momentum=False,
-        )
+        self.schedule = one_cycle(self.optimizer, settings)
         self.step = self.skipped = 0
         self._window: list[dict[str, float]] = []  # figures of the steps since the last log
         if self.checkpoint.exists():

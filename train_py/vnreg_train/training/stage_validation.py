@@ -29,7 +29,15 @@ def validate_stage(
     """
     data = config.data
     batch = min(PAIRS, len(shapes))
-    sampler = TrainingSampler(shapes, data.points, batch, data.settings, seed=SEED, queries=0)
+    sampler = TrainingSampler(
+        shapes,
+        data.points,
+        batch,
+        data.settings,
+        seed=SEED,
+        queries=0,
+        diagonal_crops=data.diagonal_crops,
+    )
     sequence = BatchSequence(
         sampler,
         neighbours=data.neighbours or config.network.neighbours,

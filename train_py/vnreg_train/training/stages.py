@@ -49,17 +49,18 @@ class CoarseStage(nn.Module):
         return [p for module in modules for p in module.parameters()]
 
     def _features(
-        self, edges: Tensor, queries: Tensor | None
+        self, edges: Tensor, queries: Tensor | None, places: Tensor | None
     ) -> tuple[Tensor, Tensor, Tensor | None]:
         """Latent, global feature, and the decoder's logits where there are labels."""
         with torch.autocast("cpu", torch.bfloat16, enabled=self.config.bfloat16):
             latent, feature = self.network.encode(edges)
             if self.config.occupancy_weight == 0 or queries is None:
                 return latent, feature.float(), None
-            return latent, feature.float(), self.network.decoder(queries, feature).float()
+            seen = feature if places is None else feature + places.unsqueeze(2)
+            return latent, feature.float(), self.network.decoder(queries, seen).float()
 
     def forward(self, batch: Batch) -> Losses:
-        _, feature, logits = self._forward(batch.edges, batch.queries)
+        _, feature, logits = self._forward(batch.edges, batch.queries, batch.places)
         loss, terms, _ = self.losses(feature, logits, batch)
         return loss, terms
 
@@ -67,7 +68,7 @@ class CoarseStage(nn.Module):
         self, batch: Batch
     ) -> tuple[Tensor, Tensor, Tensor, dict[str, Tensor], Pose]:
         """For the joint stage: latent, global feature, loss, terms and the coarse pose."""
-        latent, feature, logits = self._forward(batch.edges, batch.queries)
+        latent, feature, logits = self._forward(batch.edges, batch.queries, batch.places)
         loss, terms, pose = self.losses(feature, logits, batch)
         return latent, feature, loss, terms, pose
 

@@ -61,6 +61,7 @@ class StageTrainer(Trainer[RegistrationNetwork, Batch]):
             seed=seed,
             queries=data.queries,
             augment=data.anisotropic,
+            diagonal_crops=data.diagonal_crops,
         )
         return BatchSequence(
             sampler,
@@ -69,6 +70,7 @@ class StageTrainer(Trainer[RegistrationNetwork, Batch]):
             turn=self.stage != "coarse",
             steps=settings.steps,
             apart=not network.equivariant,
+            move=not settings.centred_occupancy,
         )
 
     def _choose_first_weights(self) -> None:
