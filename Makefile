@@ -173,36 +173,54 @@ train: data ## train models/vnreg.vnr's network from the start (hours); resumes
 	$(PY) -m vnreg_train.cli train vnreg
 
 train-paper: data ## train models/small.vnr's network, the paper's, from the start (hours); resumes
-	$(PY) -m vnreg_train.cli train small --stage coarse
-	$(PY) -m vnreg_train.cli train small --stage fine
+	$(PY) -m vnreg_train.cli train $(PAPER_TRAIN) --stage coarse
+	$(PY) -m vnreg_train.cli train $(PAPER_TRAIN) --stage fine
 
-# docs/paper.md, part by part; each resumes, and can be called alone.
+# docs/paper.md, part by part; each resumes, and can be called alone. PAPER_BUDGET=smoke makes all of it
+# in minutes, of a network that has learned nothing, into runs/paper-smoke.
+PAPER_BUDGET ?= full
+ifeq ($(PAPER_BUDGET),smoke)
+PAPER := runs/paper-smoke
+PAPER_TRAIN := smoke --run $(PAPER)/network
+PAPER_TRAINED := $(PAPER)/network
+PAPER_OUT := $(PAPER)/page/paper
+PAPER_PAIRS := --split validation --shapes 3
+PAPER_ABLATION := --config smoke
+PAPER_ROUNDS := --rounds 1
+PAPER_STEPS := --steps 1 --lines 2
+else
 PAPER := runs/paper
-paper: paper-train paper-recall paper-ablation paper-speed paper-page ## train the paper's network (hours) and reproduce its tables, into docs/paper.md; resumes
+PAPER_TRAIN := small
+PAPER_TRAINED := runs/small
+PAPER_OUT := docs/paper
+endif
+TRAINER := $(PY) -m vnreg_train.cli
+paper: paper-train paper-recall paper-ablation paper-speed paper-page ## train the paper's network (hours) and reproduce its tables, into docs/paper.md; resumes; PAPER_BUDGET=smoke: minutes
 
 paper-train: train-paper
 	mkdir -p $(PAPER)
-	$(PY) -m vnreg_train.cli export runs/small/fine.pt $(PAPER)/small.vnr --name small
-	$(PY) -m vnreg_train.cli export runs/small/fine.pt $(PAPER)/longer.vnr --name longer \
+	$(TRAINER) export $(PAPER_TRAINED)/fine.pt $(PAPER)/small.vnr --name small
+	$(TRAINER) export $(PAPER_TRAINED)/fine.pt $(PAPER)/longer.vnr --name longer \
 	  --keep-divisor 3 --fine-iterations 16
 
 paper-recall: python data
-	$(PY) -m vnreg_train.cli evaluate --rows p0 --methods coarse paper --paper-model $(PAPER)/small.vnr \
-	  --run $(PAPER)/evaluate --jobs 2
-	$(PY) -m vnreg_train.cli paper-recall --run $(PAPER)/evaluate
-	$(PY) -m vnreg_train.cli evaluate --rows 'P0/*/180' --methods paper --run $(PAPER)/longer \
-	  --paper-model $(PAPER)/longer.vnr --jobs 2
-	$(PY) -m vnreg_train.cli paper-recall --run $(PAPER)/longer --longer $(PAPER)/longer.vnr
+	$(TRAINER) evaluate --rows p0 --methods coarse paper --paper-model $(PAPER)/small.vnr \
+	  --run $(PAPER)/evaluate --jobs 2 $(PAPER_PAIRS)
+	$(TRAINER) paper-recall --run $(PAPER)/evaluate --trained $(PAPER_TRAINED) --out $(PAPER_OUT) $(PAPER_PAIRS)
+	$(TRAINER) evaluate --rows 'P0/*/180' --methods paper --run $(PAPER)/longer \
+	  --paper-model $(PAPER)/longer.vnr --jobs 2 $(PAPER_PAIRS)
+	$(TRAINER) paper-recall --run $(PAPER)/longer --longer $(PAPER)/longer.vnr --out $(PAPER_OUT) $(PAPER_PAIRS)
 
 paper-ablation: python data
-	$(PY) -m vnreg_train.cli paper-ablation --run $(PAPER)/ablation
+	$(TRAINER) paper-ablation --run $(PAPER)/ablation --out $(PAPER_OUT) $(PAPER_ABLATION) $(PAPER_PAIRS)
 
 paper-speed: python
-	$(PY) -m vnreg_train.cli paper-speed
-	$(PY) -m vnreg_train.cli paper-training-speed
+	$(TRAINER) paper-speed --out $(PAPER_OUT) $(PAPER_ROUNDS)
+	$(TRAINER) paper-training-speed --out $(PAPER_OUT) $(PAPER_STEPS)
 
 paper-page: setup
-	$(PY) -m vnreg_train.cli paper-page
+	test -e $(PAPER_OUT)/notes.md || cp docs/paper/notes.md $(PAPER_OUT)
+	$(TRAINER) paper-page --out $(PAPER_OUT)
 
 $(VENV)/.peers: requirements/evaluate.txt $(VENV)/.installed
 	$(call install_debian,$(PEERS_DEBIAN))

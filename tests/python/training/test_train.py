@@ -17,6 +17,7 @@ from tiny_run import STEPS, bent_boxes, tiny_config, train_steps, trainer
 from vnreg_train.data.shapes import ShapeSet
 from vnreg_train.training.config import OptimisationConfig, TrainingConfig, load_config
 from vnreg_train.training.loop import one_cycle
+from vnreg_train.training.matching import composed, moved
 from vnreg_train.training.train import StageTrainer
 
 
@@ -200,3 +201,64 @@ def test_occupancy_that_is_not_centred_trains_another_network(tmp_path: Path) ->
         found.append(figures[0])
     assert found[0]["registration"] == found[1]["registration"]
     assert found[0]["occupancy"] != found[1]["occupancy"]
+
+
+@pytest.mark.parametrize("stage", ["coarse", "fine", "joint"])
+def test_a_step_makes_its_tensors_where_the_network_is(tmp_path: Path, stage: str) -> None:
+    """Every tensor that a step makes without asking where would lie on `meta` here, without data.
+
+    It shows that nothing is left to torch's default device, not that a GPU trains.
+    """
+    config = replace(tiny_config(), network=replace(tiny_config().network, invariant_layer=False))
+    settings = replace(config.coarse, tested_share=0.5, unrolled=2, bfloat16=True)
+    settings = replace(settings, scaled_start=stage == "coarse", centred_occupancy=False)
+    config = replace(config, **{stage: settings})
+    stages_before(tmp_path, stage, config)
+    run = trainer(tmp_path, stage, config)
+    run.validation = bent_boxes(4)
+    batch = run.batches[0]
+    with torch.device("meta"):
+        figures = run.train_step(batch)
+    assert math.isfinite(figures["loss"]) and run.skipped == 0
+
+
+def test_a_batch_goes_to_another_device_whole() -> None:
+    batch = trainer(Path("unused"), "coarse").batches[0]
+    assert batch.to(torch.device("cpu")) is batch
+    there = batch.to(torch.device("meta"))
+    for name, part in vars(batch).items():
+        other = getattr(there, name)
+        assert (part is None and other is None) or (other.is_meta and other.shape == part.shape)
+
+
+def test_the_device_is_the_configurations(tmp_path: Path) -> None:
+    """`meta` stands for a device that is not the processor: weights and average lie there."""
+    config = tiny_config()
+    config = replace(config, device="meta", coarse=replace(config.coarse, scaled_start=False))
+    run = trainer(tmp_path, "coarse", config)
+    weights = [*run.network.parameters(), *run.average.module.parameters()]
+    assert all(weight.is_meta for weight in weights)
+
+
+def test_unrolled_iterations_are_those_of_the_fine_register(tmp_path: Path) -> None:
+    """The pose that training goes on from is that after some number of plain iterations."""
+    config = tiny_config()
+    config = replace(config, fine=replace(config.fine, unrolled=3))
+    stages_before(tmp_path, "fine", config)
+    run = trainer(tmp_path, "fine", config)
+    matching, fine = run.module.matching, run.network.eval().fine
+    generator = torch.Generator().manual_seed(0)
+    x, y, f_x, f_y = (torch.randn(2, 16, n, generator=generator) for n in (3, 3, 8, 8))
+    turn = torch.linalg.qr(torch.randn(2, 3, 3, generator=generator)).Q
+    pose = turn * torch.det(turn)[:, None, None], torch.ones(2, 3)
+    steps = fine.run(moved(x, pose), y, f_x.relu(), f_y.relu())
+    expected = [pose, *(composed(step, pose) for step in steps)]
+    met = set()
+    for _ in range(40):
+        found = matching._unrolled(x, y, f_x.relu(), f_y.relu(), pose)
+        gaps = [
+            float((found[0] - e[0]).abs().max() + (found[1] - e[1]).abs().max()) for e in expected
+        ]
+        assert min(gaps) < 1e-4
+        met.add(gaps.index(min(gaps)))
+    assert met == {0, 1, 2, 3}

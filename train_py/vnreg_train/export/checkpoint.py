@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from vnreg_train.export.descriptor_model import export_descriptor_model, load_descriptor_checkpoint
 from vnreg_train.export.model import Metadata, export_golden, export_model, load_checkpoint
+from vnreg_train.training.checkpoint import read_checkpoint
 
 
 def checkpoint_arch(checkpoint: Path) -> str:
     """`paper` or `vnreg`."""
-    return str(torch.load(checkpoint, weights_only=True)["config"].get("arch", "paper"))
+    return str(read_checkpoint(checkpoint)["config"].get("arch", "paper"))
 
 
 def export_checkpoint(

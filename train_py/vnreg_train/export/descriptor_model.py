@@ -15,6 +15,7 @@ from vnreg_train.export.architecture import check_architecture
 from vnreg_train.model_file import MetadataValue, read_model, write_model
 from vnreg_train.networks.descriptor import Block, DescriptorNetwork, Neighbourhood
 from vnreg_train.networks.descriptor_config import DescriptorConfig
+from vnreg_train.training.checkpoint import read_checkpoint
 
 Metadata = dict[str, int | float | bool | str]
 
@@ -126,7 +127,7 @@ def descriptor_tensors(network: DescriptorNetwork) -> dict[str, NDArray[np.float
 
 def load_descriptor_checkpoint(path: Path) -> tuple[DescriptorNetwork, dict[str, Any]]:
     """A checkpoint's averaged weights in evaluation mode, and its configuration."""
-    state = torch.load(path, weights_only=True)
+    state = read_checkpoint(path)
     network = DescriptorNetwork(DescriptorConfig.from_dict(state["config"]["network"]))
     network.load_state_dict(state["ema"])
     return network.eval(), state["config"]

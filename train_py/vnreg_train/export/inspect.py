@@ -11,7 +11,6 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from vnreg_train.export.architecture import check_architecture
@@ -23,6 +22,7 @@ from vnreg_train.model_file import (
     read_checksum,
     read_model,
 )
+from vnreg_train.training.checkpoint import read_checkpoint
 
 Metadata = Mapping[str, MetadataValue]
 Tensors = Mapping[str, NDArray[Any]]
@@ -87,7 +87,7 @@ def checkpoint_text(path: Path) -> str:
         # torch meets bytes that are no archive with whatever its unpickler trips over.
         if not zipfile.is_zipfile(path):
             raise InspectError(f"{path}: not a checkpoint: expected a zip archive")
-        state = torch.load(path, weights_only=True)
+        state = read_checkpoint(path)
     except (pickle.UnpicklingError, RuntimeError) as error:
         raise InspectError(f"{path}: not a checkpoint: {error}") from error
     missing = {"stage", "step", "network", "ema", "optimizer", "schedule", "config"} - set(state)

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from vnreg_train.export.reference import Reference
@@ -14,6 +13,7 @@ from vnreg_train.export.tensors import engine_tensors
 from vnreg_train.model_file import read_checksum, read_model, write_model
 from vnreg_train.networks.config import NetworkConfig
 from vnreg_train.networks.registration import RegistrationNetwork
+from vnreg_train.training.checkpoint import read_checkpoint
 
 Metadata = dict[str, int | float | bool | str]
 ENGINE_ABLATIONS = ("shared_encoder", "invariant_layer")  # in a file only where false
@@ -80,7 +80,7 @@ def export_model(
 
 def load_checkpoint(path: Path) -> tuple[RegistrationNetwork, dict[str, Any]]:
     """A checkpoint's averaged weights in evaluation mode, and its configuration."""
-    state = torch.load(path, weights_only=True)
+    state = read_checkpoint(path)
     network = RegistrationNetwork(NetworkConfig.from_dict(state["config"]["network"]))
     network.load_state_dict(state["ema"])
     return network.eval(), state["config"]

@@ -71,7 +71,7 @@ class LocalModule(nn.Module):
         invariant layer is off: the axes then, with which V Z^T is V.
         """
         if self.invariant is None:
-            return torch.eye(3, dtype=v.dtype).expand(*v.shape[:-2], 3, 3)
+            return torch.eye(3, dtype=v.dtype, device=v.device).expand(*v.shape[:-2], 3, 3)
         for layer in self.invariant:
             v = layer(v)
         return v

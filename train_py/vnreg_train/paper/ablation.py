@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from tensorboard.backend.event_processing.event_accumulator import (  # type: ignore[import-untyped]
     EventAccumulator,
 )
@@ -29,6 +28,7 @@ from vnreg_train.networks.config import NetworkConfig
 from vnreg_train.networks.registration import RegistrationNetwork
 from vnreg_train.paper.registrations import Register, make_register, runs_in_engine
 from vnreg_train.paper.variants import VARIANTS, variant_config
+from vnreg_train.training.checkpoint import read_checkpoint
 from vnreg_train.training.config import TrainingConfig
 from vnreg_train.training.train import StageTrainer
 
@@ -91,7 +91,7 @@ def train_stage(config: TrainingConfig, stage: str, run: Path, data: Path) -> No
     """To the last step of the schedule, from the checkpoint where there is one."""
     checkpoint = run / f"{stage}.pt"
     if checkpoint.exists():
-        step = torch.load(checkpoint, weights_only=True)["step"]
+        step = read_checkpoint(checkpoint)["step"]
         if step >= getattr(config, stage).steps:
             return
     shapes = load_shapes(data, "train", points=config.data.surface_points or None)
@@ -101,7 +101,7 @@ def train_stage(config: TrainingConfig, stage: str, run: Path, data: Path) -> No
 def load_variant(checkpoint: Path, config: TrainingConfig, name: str) -> RegistrationNetwork:
     """The variant's weights, averaged or not, in evaluation mode."""
     variant = VARIANTS[name]
-    state = torch.load(checkpoint, weights_only=True)
+    state = read_checkpoint(checkpoint)
     switches: NetworkConfig = replace(config.network, weighted_centroids=variant.weighted_centroids)
     network = RegistrationNetwork(switches)
     network.load_state_dict(state["ema" if variant.averaged else "network"])

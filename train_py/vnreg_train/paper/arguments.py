@@ -57,7 +57,6 @@ def add_paper_commands(commands: Subcommands) -> None:
     ablation.add_argument("--config", default="ablation", help="the base configuration")
     ablation.add_argument("--run", default="runs/paper/ablation", help="folder of its trainings")
     _add_pairs(ablation)
-    ablation.add_argument("--shapes", type=int, help="measure on so many only, spread evenly")
     ablation.add_argument("--variants", nargs="+", help="only these (default: all)")
     recall = _add(commands, "paper-recall", RECALL, _recall)
     recall.add_argument("--run", default="runs/paper/evaluate", help="folder of the answers")
@@ -87,6 +86,7 @@ def _add_pairs(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--split", default="test", choices=("validation", "test"), help="whose pairs are measured"
     )
+    command.add_argument("--shapes", type=int, help="only so many of them, spread evenly")
 
 
 def _write(arguments: argparse.Namespace, part: str, figures: dict[str, Any]) -> None:
@@ -126,7 +126,7 @@ def _recall(arguments: argparse.Namespace) -> None:
     from vnreg_train.model_file import read_model
     from vnreg_train.paper.ablation import STAGES, read_curves
 
-    pairing = Pairing(arguments.split, None, 0, Path(arguments.data))
+    pairing = Pairing(arguments.split, arguments.shapes, 0, Path(arguments.data))
     results = collect_results(Path(arguments.run), pairing, read_symmetries())
     kept = ("plain", "halves", "rotation_deg", "ms")
     rows = {

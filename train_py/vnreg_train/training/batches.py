@@ -9,7 +9,7 @@ pair turned apart, as the evaluation's pairs are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import torch
@@ -34,6 +34,13 @@ class Batch:
     translation: Tensor  # (B, 3): target = rotation source + translation, network coordinates
     rotation: Tensor | None = None  # (B, 3, 3); None is the identity
     places: Tensor | None = None  # (2B, 3): where queries that are not centred see the features
+
+    def to(self, device: torch.device) -> Batch:
+        """The same batch there; itself where it is there already."""
+        if self.points.device == device:
+            return self
+        parts = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Batch(**{k: v if v is None else v.to(device) for k, v in parts.items()})
 
     def residual(self, rotation: Tensor, translation: Tensor) -> tuple[Tensor, Tensor]:
         """What separates a pose from the true one: R_gt^T R (B, 3, 3) and t - t_gt (B, 3)."""

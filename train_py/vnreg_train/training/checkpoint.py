@@ -21,6 +21,12 @@ def save_checkpoint(path: Path, **parts: Any) -> None:
     os.replace(temporary, path)
 
 
+def read_checkpoint(path: Path) -> dict[str, Any]:
+    """Its parts, in this processor's memory, wherever they were trained."""
+    parts: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
+    return parts
+
+
 def training_state(
     stage: str,
     step: int,

@@ -73,6 +73,7 @@ def _add_train(command: argparse.ArgumentParser) -> None:
     command.add_argument("--data", help="folder of the shapes (default: as configured)")
     command.add_argument("--steps", type=int, help="in the schedule (default: as configured)")
     command.add_argument("--threads", type=int, help="of torch (default: as configured)")
+    command.add_argument("--device", help="of torch, for the paper's network: cpu, cuda, cuda:1")
     command.add_argument("--minutes", type=float, default=float("inf"), help="stop after so long")
     command.add_argument("--quiet", action="store_true", help="no progress bar")
     command.set_defaults(run_command=train_network)
@@ -149,6 +150,8 @@ def train_stage(arguments: argparse.Namespace) -> None:
     config = _with_steps(load_config(arguments.config), arguments.stage, arguments.steps)
     if arguments.threads:
         config = replace(config, threads=arguments.threads)
+    if arguments.device:
+        config = replace(config, device=arguments.device)
     folder = Path(arguments.data or config.data.folder)
     shapes = load_shapes(folder, "train", points=config.data.surface_points or None)
     run = Path(arguments.run or Path("runs") / config.name)

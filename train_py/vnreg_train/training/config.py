@@ -62,6 +62,7 @@ class StageConfig(OptimisationConfig):
     consistency_weight: float = 0.0  # ours: whitened distance of the paired global features
     scaled_start: bool = False  # ours: initial weights scaled on data
     gradient_limit: float = 0.0  # ours: largest gradient of one pair's Procrustes; 0 = none
+    unrolled: int = 0  # ours: up to so many iterations, drawn evenly, come before the trained ones
     tested_share: float = 0.0  # ours: share of the pairs matched between points kept as at test
     matching_weight: float = 1.0  # of the fine register's losses
 
@@ -84,6 +85,7 @@ class RunConfig:
 class TrainingConfig(RunConfig):
     """The whole file."""
 
+    device: str = "cpu"  # of torch: cpu, cuda, cuda:1
     network: NetworkConfig = field(default_factory=NetworkConfig)
     data: DataConfig = field(default_factory=DataConfig)
     coarse: StageConfig = field(default_factory=StageConfig)

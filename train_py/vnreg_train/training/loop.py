@@ -17,6 +17,7 @@ from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from tqdm import tqdm
 
 from vnreg_train.training.checkpoint import (
+    read_checkpoint,
     restore_training_state,
     save_checkpoint,
     training_state,
@@ -120,7 +121,7 @@ class Trainer(ABC, Generic[NetworkT, BatchT]):
         save_checkpoint(self.checkpoint, **state, skipped=self.skipped, window=self._window)
 
     def _restore(self) -> None:
-        state = torch.load(self.checkpoint, weights_only=True)
+        state = read_checkpoint(self.checkpoint)
         self.step = restore_training_state(
             state, self.network, self.average, self.optimizer, self.schedule
         )

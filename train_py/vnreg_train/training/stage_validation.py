@@ -46,9 +46,10 @@ def validate_stage(
         steps=len(shapes) // batch,
         apart=not config.network.equivariant,
     )
+    device = next(network.parameters()).device
     coarse, final = [], []
     for index in range(len(sequence)):
-        pairs = sequence[index]
+        pairs = sequence[index].to(device)
         poses = stage_poses(network, pairs, fine)
         coarse.append(pose_errors(*pairs.residual(*poses[0])))
         final.append(pose_errors(*pairs.residual(*poses[-1])))

@@ -12,6 +12,7 @@ from vnreg_train.data.resample import TrainingSampler
 from vnreg_train.data.shapes import ShapeSet
 from vnreg_train.networks.registration import RegistrationNetwork
 from vnreg_train.training.batches import Batch, BatchSequence
+from vnreg_train.training.checkpoint import read_checkpoint
 from vnreg_train.training.config import StageConfig, TrainingConfig
 from vnreg_train.training.flops import pair_gflop
 from vnreg_train.training.initial import scale_initial_weights
@@ -46,7 +47,8 @@ class StageTrainer(Trainer[RegistrationNetwork, Batch]):
         self.config, self.stage, self.validation = config, stage, validation
         self._initial = initial
         settings: StageConfig = getattr(config, stage)
-        network = RegistrationNetwork(config.network)
+        self.device = torch.device(config.device)
+        network = RegistrationNetwork(config.network).to(self.device)
         self.module: Stage = STAGES[stage](network, settings, config.compile)
         self.batches = self._sequence(shapes, settings, config.seed + list(STAGES).index(stage))
         super().__init__(stage, network, self.module.trainable(), config, settings, run_folder)
@@ -79,10 +81,10 @@ class StageTrainer(Trainer[RegistrationNetwork, Batch]):
             weights = self._initial or self.run_folder / f"{BEFORE[self.stage]}.pt"
             if not weights.exists():
                 raise FileNotFoundError(f"{weights}: train stage {weights.stem} first")
-            self.network.load_state_dict(torch.load(weights, weights_only=True)["ema"])
+            self.network.load_state_dict(read_checkpoint(weights)["ema"])
             self.average.module.load_state_dict(self.network.state_dict())
         elif self.module.config.scaled_start:
-            scale_initial_weights(self.network.extractor, self.batches[0].edges)
+            scale_initial_weights(self.network.extractor, self.batches[0].edges.to(self.device))
             self.average.module.load_state_dict(self.network.state_dict())
 
     def _batches(self) -> Iterable[Batch]:
@@ -93,7 +95,7 @@ class StageTrainer(Trainer[RegistrationNetwork, Batch]):
         if self.stage == "fine":  # what is frozen keeps its batch-norm statistics too
             self.network.extractor.global_module.eval()
             self.network.decoder.eval()
-        return self.module(batch)
+        return self.module(batch.to(self.device))
 
     @cached_property
     def _pair_gflop(self) -> float:
