@@ -10,6 +10,7 @@ pair turned apart, as the evaluation's pairs are.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import torch
@@ -39,7 +40,7 @@ class Batch:
         """The same batch there; itself where it is there already."""
         if self.points.device == device:
             return self
-        parts = {f.name: getattr(self, f.name) for f in fields(self)}
+        parts: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
         return Batch(**{k: v if v is None else v.to(device) for k, v in parts.items()})
 
     def residual(self, rotation: Tensor, translation: Tensor) -> tuple[Tensor, Tensor]:
