@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <numbers>
 #include <random>
 #include <sstream>
 #include <string>
@@ -116,7 +117,7 @@ struct Body {
 double angle_deg(const double* a, const double* b) {
   const Eigen::Matrix3d turn = Eigen::Map<const Matrix4>(a).topLeftCorner<3, 3>().transpose() *
                                Eigen::Map<const Matrix4>(b).topLeftCorner<3, 3>();
-  return Eigen::AngleAxisd(turn).angle() * 180 / EIGEN_PI;
+  return Eigen::AngleAxisd(turn).angle() * 180 / std::numbers::pi;
 }
 
 /// The same pose, or one that the other build ranks beside its own.

@@ -1,10 +1,9 @@
 // Any bytes to one of the readers of point clouds, chosen by VNREG_FUZZ_READER when this is
 // compiled.
 #include <cstdint>
-#include <string>
 
 #include "cloud_file/readers.hpp"
-#include "require.hpp"
+#include "messages.hpp"
 
 namespace vnreg::fuzz {
 namespace {
@@ -23,19 +22,11 @@ void check(const Points& points, std::size_t bytes) {
   for (const auto& point : points) sink = point[0] + point[1] + point[2];
 }
 
-void check(const CloudFileError& error) {
-  const std::string text = error.what();
-  require(!text.empty() && text.size() < 1000, "the message is short");
-  for (const char c : text) {
-    require(static_cast<unsigned char>(c) >= 0x20, "the message is one printable line");
-  }
-}
-
 void read(std::string_view bytes) {
   try {
     check(VNREG_FUZZ_READER, bytes.size());
   } catch (const CloudFileError& error) {
-    check(error);
+    check_message(error.what());
   }
 }
 

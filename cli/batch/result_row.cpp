@@ -1,17 +1,22 @@
 #include "batch/result_row.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <vector>
 
 #include "batch/csv.hpp"
 #include "cloud_file/text_scan.hpp"
+#include "shown_text.hpp"
 
 namespace vnreg::cli {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = nlohmann::ordered_json;  // written in the order of the columns
+// Read without one: a line of many names would take the square of their number.
+using AnyJson = nlohmann::json;
 
 // ---- CSV ----
 
@@ -105,23 +110,47 @@ std::string json_line(const ResultRow& row) {
 }
 
 template <class T>
-void read_json(const Json& json, T& value) {
+void read_json(const AnyJson& json, T& value) {
   if (!json.is_null()) json.get_to(value);
 }
 
-void read_json(const Json& json, std::optional<Pose>& value) {
+/// A fraction is left out: it may be too large for a whole number.
+void read_json(const AnyJson& json, std::int64_t& value) {
+  if (json.is_number_integer()) json.get_to(value);
+}
+
+void read_json(const AnyJson& json, std::optional<Pose>& value) {
   if (!json.is_null()) value = json.get<Pose>();
 }
 
 std::optional<ResultRow> parse_json_row(std::string_view line) {
   try {
-    const Json json = Json::parse(line);
+    const AnyJson json = AnyJson::parse(line);
     ResultRow row;
     for_each_column(row, [&](const char* name, auto& field) { read_json(json.at(name), field); });
     return row;
-  } catch (const Json::exception&) {
+  } catch (const AnyJson::exception&) {
     return std::nullopt;
   }
+}
+
+// ---- both ----
+
+bool is_status(std::string_view name) {
+  static constexpr std::string_view none = "unknown";  // beyond the last one
+  if (name == ResultRow().status) return true;
+  for (int i = 0;; ++i) {
+    const std::string_view known = to_string(static_cast<Status>(i));
+    if (known == none || known == name) return known != none;
+  }
+}
+
+bool is_shown_text(const std::string& text) { return shown_text(text) == text; }
+
+/// True if it is what this program puts into a row: statuses and messages reach terminals.
+bool is_of_a_batch(const ResultRow& row) {
+  return is_status(row.status) && is_shown_text(row.id) && is_shown_text(row.source) &&
+         is_shown_text(row.target) && is_shown_text(row.error);
 }
 
 }  // namespace
@@ -156,7 +185,11 @@ std::string row_line(const ResultRow& row, RowFormat format) {
 }
 
 std::optional<ResultRow> parse_row(std::string_view line, RowFormat format) {
-  return format == RowFormat::csv ? parse_csv_row(line) : parse_json_row(line);
+  auto row = format == RowFormat::csv ? parse_csv_row(line) : parse_json_row(line);
+  if (!row || !is_of_a_batch(*row)) return std::nullopt;
+  const std::string written = row_line(*row, format);
+  const bool same = std::string_view(written).substr(0, written.size() - 1) == line;
+  return same ? std::move(row) : std::nullopt;
 }
 
 }  // namespace vnreg::cli

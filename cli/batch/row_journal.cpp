@@ -51,7 +51,7 @@ bool RowJournal::empty() const {
 
 std::size_t RowJournal::for_each_line(const std::function<void(std::string_view)>& visit) const {
   std::string rest;  // of the pieces read so far, what follows the last line end
-  std::string piece(std::size_t{1} << 20U, '\0');
+  std::string piece(std::size_t{1} << 16U, '\0');
   std::size_t end = 0;
   off_t offset = 0;
   for (;;) {
@@ -60,9 +60,11 @@ std::size_t RowJournal::for_each_line(const std::function<void(std::string_view)
     if (got < 0) fail_with("a file that can be read");
     if (got == 0) return end;
     offset += got;
+    const std::size_t searched = rest.size();  // a line may be as long as the file
     rest.append(piece, 0, static_cast<std::size_t>(got));
     std::string_view lines = rest;
-    for (std::size_t size = lines.find('\n'); size != lines.npos; size = lines.find('\n')) {
+    for (std::size_t size = lines.find('\n', searched); size != lines.npos;
+         size = lines.find('\n')) {
       visit(lines.substr(0, size));
       lines.remove_prefix(size + 1);
       end += size + 1;

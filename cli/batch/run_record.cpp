@@ -12,12 +12,22 @@ namespace vnreg::cli {
 namespace {
 
 using Json = nlohmann::ordered_json;
+// A file may hold many names; this finds one without looking at all of them.
+using AnyJson = nlohmann::json;
 
 /// Tells model files apart; of the built-in model its name and the program's version do.
 Json checksum_of(const std::string& model) {
   if (model.empty()) return nullptr;
   const auto bytes = model_format::read_file(model);
   return head_checksum(bytes.span());
+}
+
+/// As messages show it: the file may be of any size, and anybody's.
+std::string shown(const AnyJson& value) {
+  static constexpr std::size_t longest = 40;
+  static constexpr bool as_ascii = true;
+  const std::string text = value.dump(-1, ' ', as_ascii);
+  return text.size() > longest ? text.substr(0, longest) + "..." : text;
 }
 
 [[noreturn]] void refuse(const std::string& path, const std::string& expected,
@@ -52,16 +62,17 @@ void write_record(const std::string& path, const std::string& record) {
 }
 
 void check_record(const std::string& path, const std::string& record) {
-  Json found;
+  AnyJson found;
   try {
-    found = Json::parse(cloud_file::read_bytes(path));
+    found = AnyJson::parse(cloud_file::read_bytes(path));
   } catch (const std::exception&) {
     refuse(path, "the settings of the run that wrote the rows", "none");
   }
   const Json expected = Json::parse(record);
-  for (const auto& [key, value] : expected.items()) {
-    const Json other = found.is_object() && found.contains(key) ? found[key] : Json(nullptr);
-    if (other != value) refuse(path, key + ' ' + value.dump(), other.dump());
+  for (const auto& [key, json] : expected.items()) {
+    const AnyJson value(json);
+    const AnyJson other = found.is_object() && found.contains(key) ? found[key] : AnyJson(nullptr);
+    if (other != value) refuse(path, key + ' ' + shown(value), shown(other));
   }
 }
 
