@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+import random
+import signal
+import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +16,11 @@ import torch
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from killed_run import KILLED_STEPS, killed_config
 from tiny_run import STEPS, bent_boxes, tiny_config, train_steps, trainer
 
 from vnreg_train.data.shapes import ShapeSet
+from vnreg_train.training.checkpoint import read_checkpoint
 from vnreg_train.training.config import OptimisationConfig, TrainingConfig, load_config
 from vnreg_train.training.loop import one_cycle
 from vnreg_train.training.matching import composed, moved
@@ -65,6 +71,35 @@ def test_the_loop_stops_saves_and_goes_on(tmp_path: Path) -> None:
     again.run(progress=False)
     assert again.step == STEPS
     assert list((tmp_path / "tensorboard" / "coarse").glob("events*"))
+
+
+def kill_after(folder: Path, least: int, delay: float) -> int:
+    """Starts or goes on with the run, kills it so many seconds after step `least` was saved; the
+    step of the checkpoint that it left."""
+    script = [sys.executable, Path(__file__).with_name("killed_run.py"), folder]
+    process = subprocess.Popen(script)
+    checkpoint = folder / "coarse.pt"
+    while not checkpoint.exists() or read_checkpoint(checkpoint)["step"] < least:
+        assert process.poll() is None, "it ended before it was killed"
+        time.sleep(0.001)
+    time.sleep(delay)
+    process.kill()
+    assert process.wait() == -signal.SIGKILL, "it ended before it was killed"
+    return int(read_checkpoint(checkpoint)["step"])
+
+
+def test_a_run_that_is_killed_loses_no_step_that_was_saved(tmp_path: Path) -> None:
+    whole = trainer(tmp_path / "whole", "coarse", killed_config())
+    train_steps(whole, KILLED_STEPS)
+    rng = random.Random(0)
+    first = kill_after(tmp_path / "killed", 3, rng.uniform(0, 0.05))
+    second = kill_after(tmp_path / "killed", first + 3, rng.uniform(0, 0.05))
+    assert 3 <= first < second < KILLED_STEPS
+    last = trainer(tmp_path / "killed", "coarse", killed_config())
+    assert last.step == second
+    last.run(progress=False)
+    assert last.step == KILLED_STEPS
+    assert torch.equal(parameters(whole), parameters(last))
 
 
 @pytest.mark.parametrize("steps", [1, 2, 19, 20, 21, 200])
