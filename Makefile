@@ -18,16 +18,18 @@ SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python test-isa soak \
         viewer viewer-three viewer-picture \
-        check sanitize tsan coverage tidy analyse valgrind stress fuzz fuzzers fuzz-builds fuzz-coverage \
+        check sanitize sanitize-readers tsan coverage tidy analyse valgrind stress \
+        fuzz fuzzers fuzz-builds fuzz-coverage nightly \
         bench bench-compare batch-kills evaluate gallery train train-paper data \
         paper paper-train paper-recall paper-ablation paper-speed paper-page model docs wheel clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
 
-# Installs what is missing of a list of Debian packages.
+# Installs what is missing of a list of Debian packages, one list at a time.
 define install_debian
-	@missing=$$(dpkg-query -W -f='$${Package} $${db:Status-Abbrev}\n' $(1) 2>&1 \
+	@exec 9< Makefile && flock 9 && \
+	missing=$$(dpkg-query -W -f='$${Package} $${db:Status-Abbrev}\n' $(1) 2>&1 \
 	  | awk '/no packages found matching/ {print $$NF} $$2 == "un" {print $$1}'); \
 	if [ -n "$$missing" ]; then \
 	  $(SUDO) apt-get update -q && $(SUDO) apt-get install -y -q --no-install-recommends $$missing; fi
@@ -110,6 +112,11 @@ sanitize: debian-packages ## the C++ tests under address and undefined-behaviour
 	cmake --build --preset sanitize
 	ctest --preset sanitize
 
+# What continuous integration has the minutes for: the readers of files from strangers.
+sanitize-readers: fuzzers
+	cmake --build --preset sanitize --target test_model_format test_cloud_file test_batch_files
+	ctest --preset sanitize -j2 -R '^(model_format|cloud_file|batch_files)$$'
+
 # Of clang, whose OpenMP tells the sanitizer where threads meet (libarcher); GCC's does not.
 tsan: debian-packages ## the C++ tests under the thread sanitizer
 	$(call install_debian,$(FUZZ_DEBIAN))
@@ -125,23 +132,21 @@ coverage: debian-packages ## the lines of engine, kernels and model format that 
 
 tidy: debian-packages ## clang-tidy over the C++ code
 	$(call install_debian,clang-tidy-14 $(FUZZ_DEBIAN))
-	cmake --preset coverage > /dev/null
-	run-clang-tidy-14 -clang-tidy-binary clang-tidy-14 -quiet -p build/coverage \
-	  '^$(CURDIR)/(model_format|kernels|engine|cli|viewer)/.*\.cpp$$'
+	cmake --preset fuzz > /dev/null
+	run-clang-tidy-14 -clang-tidy-binary clang-tidy-14 -quiet -p build/fuzz \
+	  '^$(CURDIR)/(model_format|kernels|engine|cli|viewer|fuzz)/.*\.cpp$$'
 
 analyse: debian-packages ## static analysis of the C++ code by cppcheck
 	$(call install_debian,cppcheck)
 	cppcheck --quiet --std=c++20 --language=c++ --enable=warning,performance,portability --inline-suppr \
 	  --suppressions-list=.cppcheck -I. -Iengine/include -Icli --error-exitcode=1 model_format cli kernels engine viewer fuzz
 
-# One pair from files to pose, with the least instructions, which valgrind knows.
-valgrind: debian-packages ## one pair end to end under valgrind, leaks included
+# The release build: valgrind knows the instructions of x86-64-v3.
+valgrind: build ## one pair from files to pose under valgrind, leaks included
 	$(call install_debian,valgrind)
-	cmake --preset debug -DVNREG_ISA=x86-64-v2 -B build/valgrind > /dev/null
-	cmake --build build/valgrind --target vnreg_cli
 	valgrind --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=definite,indirect,possible \
-	  build/valgrind/vnreg align examples/data/mug_1.xyz examples/data/mug_2.xyz --threads 1 \
-	  --max-points 128 > /dev/null || [ $$? -eq 4 ]  # 4: not sure
+	  $(CLI) align examples/data/mug_1.xyz examples/data/mug_2.xyz --threads 1 --max-points 128 \
+	  > /dev/null || [ $$? -eq 4 ]  # 4: not sure
 
 stress: build ## 8 threads x 10,000 aligns of one model, twice: undisturbed, and in a storm of cancellations
 	VNREG_STRESS_ALIGNS=10000 build/$(PRESET)/test_engine "8 threads*,a storm of cancellations*"
@@ -157,7 +162,7 @@ fuzz-builds: debian-packages
 	cmake --preset fuzz-builds > /dev/null
 	cmake --build --preset fuzz-builds
 
-fuzz: fuzzers $(if $(TARGETS),$(filter fuzz-builds,$(TARGETS:%=fuzz-%)),fuzz-builds) ## all fuzz targets for SECONDS=60 each, from their corpora; TARGETS="ply model": only these
+fuzz: fuzzers $(if $(TARGETS),$(filter fuzz-builds,$(TARGETS:%=fuzz-%)),fuzz-builds) ## all fuzz targets for SECONDS=60 each, from their corpora; TARGETS="ply model": only these; JOBS=2: two at a time
 	fuzz/run.sh build/fuzz $(SECONDS) $(TARGETS)
 
 fuzz-coverage: debian-packages ## the lines of the readers that the corpora of the fuzz targets cover
@@ -165,6 +170,11 @@ fuzz-coverage: debian-packages ## the lines of the readers that the corpora of t
 	cmake --preset fuzz-coverage > /dev/null
 	cmake --build --preset fuzz-coverage
 	fuzz/coverage.sh build/fuzz-coverage
+
+# Hours; JOBS fuzz targets at a time.
+nightly: SECONDS := 600
+nightly: export JOBS := 2
+nightly: sanitize tsan tidy analyse valgrind stress coverage fuzz-coverage fuzz ## what continuous integration has no minutes for: all sanitizers, clang-tidy, valgrind, stress, coverage, 10 minutes of each fuzz target
 
 data: setup ## sample the furniture models into data/furniture
 	$(PY) -m vnreg_train.cli build-data

@@ -5,6 +5,7 @@ add_library(vnreg_baseline_flags INTERFACE)
 # Unique symbols would stay visible in the static library, where nothing but the API may be.
 target_compile_options(vnreg_baseline_flags INTERFACE
   -Wall -Wextra -Wconversion -Wshadow -ffp-contract=fast -fno-math-errno
+  $<$<CXX_COMPILER_ID:Clang>:-Wno-sign-conversion>  # -Wconversion of GCC does not include it
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-fno-gnu-unique>
   $<$<BOOL:${VNREG_WERROR}>:-Werror>)
 target_compile_definitions(vnreg_baseline_flags INTERFACE EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY)

@@ -26,6 +26,8 @@ struct BatchState {
 
 }  // namespace detail
 
+// The constructors of the API take the model by value.
+// NOLINTNEXTLINE(performance-unnecessary-value-param)
 BatchRegistrar::BatchRegistrar(Model model, Options options)
     : state_(std::make_unique<detail::BatchState>(model, options)) {}
 

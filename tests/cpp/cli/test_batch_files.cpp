@@ -118,8 +118,7 @@ TEST_CASE("a journal of one long line is read in linear time", "[batch]") {
 TEST_CASE("lines that span the pieces of a file are whole", "[batch]") {
   const TemporaryFolder folder;
   std::string bytes;
-  for (std::size_t size :
-       {std::size_t{10}, std::size_t{200'000}, std::size_t{0}, std::size_t{7}}) {
+  for (std::size_t size : {std::size_t{10}, std::size_t{200'000}, std::size_t{0}, std::size_t{7}}) {
     bytes += std::string(size, 'x') + '\n';
   }
   const RowJournal journal(folder.write("rows.jsonl", bytes + "rest"));
