@@ -110,6 +110,18 @@ double rotation_information(const Information& sum) noexcept {
   return std::max(solver.eigenvalues()(0), 0.0) / (1 + sum.weights);
 }
 
+/// One error more that all matches share, so that no number of them averages it out. A scan shows
+/// one side of a plate, a model both, nearer to each other than its points are: its planes lie
+/// between them, and the scan comes to lie on those. How much farther from its planes one cloud's
+/// points are than the other's tells by how much. (Validation shapes, single views onto the whole:
+/// mean e^T C^-1 e 97 without it, 11 with it; independent samples 3.6 and 3.2.)
+Matrix6 with_common_offset(const Matrix6& factor, const VerifiedWorkspace& v) noexcept {
+  const double offset = static_cast<double>(v.surface[0].noise - v.surface[1].noise);
+  const Matrix6 covariance = factor * factor.transpose() + offset * offset * Matrix6::Identity();
+  const Eigen::LLT<Matrix6> solver(covariance);
+  return solver.info() == Eigen::Success ? Matrix6(solver.matrixL()) : factor;
+}
+
 }  // namespace
 
 Uncertainty measure_uncertainty(const RigidTransform& pose, const VerifiedWorkspace& v) noexcept {
@@ -131,7 +143,8 @@ Uncertainty measure_uncertainty(const RigidTransform& pose, const VerifiedWorksp
       share / variance * held.square() / (held + tilt) + point_information / spacing_squared;
 
   Uncertainty result;
-  result.factor = solver.eigenvectors() * information.rsqrt().matrix().asDiagonal();
+  const Matrix6 held_by_planes = solver.eigenvectors() * information.rsqrt().matrix().asDiagonal();
+  result.factor = with_common_offset(held_by_planes, v);
   result.factor.bottomRows<3>() *= v.radius;
   result.residual = std::sqrt(residual_squared / spacing_squared);
   result.certainty = std::log10(rotation_information(sum) + 1e-6);

@@ -110,6 +110,39 @@ TEST_CASE("more noise, more uncertainty") {
   }
 }
 
+/// Three plates of unequal sizes that meet in a corner, `thickness` thick; both of their sides or
+/// only the outer one.
+Points plates(std::size_t count, double thickness, bool both_sides, Random& random) {
+  const double size[3] = {1, 0.8, 0.55};
+  Points points(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t axis = 0; axis < 3; ++axis) points[i][axis] = random.uniform(0, size[axis]);
+    const bool inner = both_sides && i % 2 == 1;
+    points[i][i % 3] = inner ? thickness : 0;
+  }
+  return points;
+}
+
+TEST_CASE("a scan of one side of plates comes to lie between both, and the covariance knows") {
+  Random random(146);
+  Registrar registrar(Model::builtin(), {.threads = 1});
+  double sum = 0;
+  constexpr int pairs = 12;
+  for (int i = 0; i < pairs; ++i) {
+    const Eigen::Isometry3d truth = random_motion(random, 0);
+    const Result& r = registrar.align(plates(700, 0.03, false, random),
+                                      moved(plates(1024, 0.03, true, random), truth));
+    const Eigen::Isometry3d pose = motion_of(r.T_target_source);
+    REQUIRE(rotation_error_deg(pose, truth) < 5);
+    const Eigen::AngleAxisd turn(truth.linear() * pose.linear().transpose());
+    Eigen::Matrix<double, 6, 1> error;
+    error << turn.angle() * turn.axis(), truth.translation() - turn * pose.translation();
+    REQUIRE(error.tail<3>().norm() > 0.005);
+    sum += error.dot(matrix(r).ldlt().solve(error));
+  }
+  REQUIRE(sum / pairs < 18);  // 6 where errors are as it says; 450 when it does not know
+}
+
 TEST_CASE("what the shape does not hold is uncertain, not singular") {
   Random random(142);
   Registrar registrar = verifier();
