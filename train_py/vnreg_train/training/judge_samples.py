@@ -20,6 +20,8 @@ from vnreg_train.evaluate.scores import LIMITS
 from vnreg_train.evaluate.symmetry import TRIVIAL, SymmetryGroup
 from vnreg_train.networks.judge import POINT_INPUTS
 
+Float16 = NDArray[np.float16]
+
 MOST_POSES = 12  # that the engine hands to its judge
 DIFFERENT_SEED = 2_000_000  # of the pairs of different shapes
 KEPT_POINTS = 128  # of each cloud, of the judge's 256: more would fill the memory for nothing
@@ -29,7 +31,7 @@ KEPT_POINTS = 128  # of each cloud, of the judge's 256: more would fill the memo
 class JudgeSamples:
     """Of N pairs: the poses in the judge's hands. Where a pair has fewer, `there` is False."""
 
-    points: NDArray[np.float16]  # (N, 12, 256, 33): KEPT_POINTS of the source, of the target
+    points: Float16  # (N, 12, 256, 33): KEPT_POINTS of the source, of the target
     fit: NDArray[np.float32]  # (N, 12)
     right: NDArray[np.bool_]  # (N, 12): up to the shape's symmetry
     there: NDArray[np.bool_]  # (N, 12)
@@ -71,7 +73,7 @@ def collect_samples(
     return _padded(found)
 
 
-def _recorded(registrar: vnreg.Registrar) -> tuple[Float64, Float64, Float64] | None:
+def _recorded(registrar: vnreg.Registrar) -> tuple[Float16, Float64, Float64] | None:
     """Of the K poses of the last call: inputs (K, 256, 33), fit (K,), rows of (R | t) (K, 12)."""
     stages = registrar.stages()
     if "judge.inputs" not in stages:
@@ -80,7 +82,8 @@ def _recorded(registrar: vnreg.Registrar) -> tuple[Float64, Float64, Float64] | 
         np.asarray(stages[f"judge.{name}"], np.float64) for name in ("inputs", "fit", "poses")
     )
     kept = _kept(int(stages["judge.source_points"].item()), len(inputs) // len(fit))
-    return inputs.reshape(len(fit), -1, POINT_INPUTS)[:, kept], fit, poses
+    kept_inputs = inputs.reshape(len(fit), -1, POINT_INPUTS)[:, kept].astype(np.float16)
+    return kept_inputs, fit, poses
 
 
 def _pairs(
@@ -109,7 +112,7 @@ def _right(pair: Pair, poses: Float64, group: SymmetryGroup) -> NDArray[np.bool_
     return np.array(right, bool)
 
 
-def _padded(found: Sequence[tuple[Float64, Float64, NDArray[np.bool_]]]) -> JudgeSamples:
+def _padded(found: Sequence[tuple[Float16, Float64, NDArray[np.bool_]]]) -> JudgeSamples:
     count = len(found)
     points = np.zeros((count, MOST_POSES, 2 * KEPT_POINTS, POINT_INPUTS), np.float16)
     fit = np.zeros((count, MOST_POSES), np.float32)
