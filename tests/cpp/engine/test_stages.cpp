@@ -145,8 +145,8 @@ class NaiveNetwork {
     const Vectors pooled = reference::vn_relu(tensor("encoder.global.relu"), w_.shared_direction,
                                               reference::mean(last));
     const Vectors global = reference::vn_linear(tensor("encoder.global.fc"), c, pooled);
-    // A mean over points of vectors that cancel: the norm is small beside the terms. Compilers differ
-    // in how they round them: 1e-4 with GCC, 3e-4 with clang.
+    // A mean over points of vectors that cancel: the norm is small beside the terms. Compilers
+    // differ in how they round them: 1e-4 with GCC, 3e-4 with clang.
     REQUIRE(error(recorded("global"), global.values) < 5e-4);
   }
 
