@@ -10,9 +10,7 @@ namespace {
 /// Unit quaternion (w, x, y, z) of the rotation part. Its largest component is taken from the
 /// diagonal and divides the others (Shepperd's method), so no angle loses digits.
 std::array<double, 4> quaternion(const Pose& pose) {
-  const auto r = [&](int row, int column) {
-    return pose[static_cast<std::size_t>(4 * row + column)];
-  };
+  const auto r = [&](std::size_t row, std::size_t column) { return pose[4 * row + column]; };
   const double trace = r(0, 0) + r(1, 1) + r(2, 2);
   // Row k holds 4 q_k q, for q = (w, x, y, z).
   const std::array<std::array<double, 4>, 4> rows{{
