@@ -185,6 +185,7 @@ train: data ## train models/vnreg.vnr's network from the start (hours); resumes
 train-paper: data ## train models/small.vnr's network, the paper's, from the start (hours); resumes
 	$(PY) -m vnreg_train.cli train $(PAPER_TRAIN) --stage coarse
 	$(PY) -m vnreg_train.cli train $(PAPER_TRAIN) --stage fine
+	$(PY) -m vnreg_train.cli train $(PAPER_REFINE) --stage fine --initial $(PAPER_TRAINED)/fine.pt
 
 # docs/paper.md, part by part; each resumes, and can be called alone. PAPER_BUDGET=smoke makes all of it
 # in minutes, of a network that has learned nothing, into runs/paper-smoke.
@@ -193,8 +194,11 @@ ifeq ($(PAPER_BUDGET),smoke)
 PAPER := runs/paper-smoke
 PAPER_TRAIN := smoke --run $(PAPER)/network
 PAPER_TRAINED := $(PAPER)/network
+PAPER_REFINE := smoke --run $(PAPER)/refined
+PAPER_REFINED := $(PAPER)/refined
 PAPER_OUT := $(PAPER)/page/paper
-PAPER_PAIRS := --split validation --shapes 3
+PAPER_SHAPES := --shapes 3
+PAPER_PAIRS := --split validation $(PAPER_SHAPES)
 PAPER_ABLATION := --config smoke
 PAPER_ROUNDS := --rounds 1
 PAPER_STEPS := --steps 1 --lines 2
@@ -202,6 +206,8 @@ else
 PAPER := runs/paper
 PAPER_TRAIN := small
 PAPER_TRAINED := runs/small
+PAPER_REFINE := refined
+PAPER_REFINED := runs/refined
 PAPER_OUT := docs/paper
 endif
 TRAINER := $(PY) -m vnreg_train.cli
@@ -209,17 +215,20 @@ paper: paper-train paper-recall paper-ablation paper-speed paper-page ## train t
 
 paper-train: train-paper
 	mkdir -p $(PAPER)
-	$(TRAINER) export $(PAPER_TRAINED)/fine.pt $(PAPER)/small.vnr --name small
-	$(TRAINER) export $(PAPER_TRAINED)/fine.pt $(PAPER)/longer.vnr --name longer \
+	$(TRAINER) export $(PAPER_REFINED)/fine.pt $(PAPER)/small.vnr --name small --keep-divisor 6
+	$(TRAINER) export $(PAPER_TRAINED)/fine.pt $(PAPER)/unrefined.vnr --name unrefined
+	$(TRAINER) export $(PAPER_REFINED)/fine.pt $(PAPER)/longer.vnr --name longer \
 	  --keep-divisor 3 --fine-iterations 16
 
 paper-recall: python data
 	$(TRAINER) evaluate --rows p0 --methods coarse paper --paper-model $(PAPER)/small.vnr \
 	  --run $(PAPER)/evaluate --jobs 2 $(PAPER_PAIRS)
-	$(TRAINER) paper-recall --run $(PAPER)/evaluate --trained $(PAPER_TRAINED) --out $(PAPER_OUT) $(PAPER_PAIRS)
+	$(TRAINER) paper-recall --run $(PAPER)/evaluate --trained $(PAPER_TRAINED) \
+	  --refined $(PAPER_REFINED) --out $(PAPER_OUT) $(PAPER_PAIRS)
 	$(TRAINER) evaluate --rows 'P0/*/180' --methods paper --run $(PAPER)/longer \
 	  --paper-model $(PAPER)/longer.vnr --jobs 2 $(PAPER_PAIRS)
 	$(TRAINER) paper-recall --run $(PAPER)/longer --longer $(PAPER)/longer.vnr --out $(PAPER_OUT) $(PAPER_PAIRS)
+	$(TRAINER) paper-iterations $(PAPER)/small.vnr --before $(PAPER)/unrefined.vnr --out $(PAPER_OUT) $(PAPER_SHAPES)
 
 paper-ablation: python data
 	$(TRAINER) paper-ablation --run $(PAPER)/ablation --out $(PAPER_OUT) $(PAPER_ABLATION) $(PAPER_PAIRS)

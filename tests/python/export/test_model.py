@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "training"))
 from tiny_run import tiny_config, train_steps, trainer
 
 from vnreg_train.cli import parser
+from vnreg_train.export.checkpoint import golden_of_checkpoint
 from vnreg_train.export.import_model import import_model
 from vnreg_train.export.model import (
     config_from_metadata,
@@ -115,3 +116,18 @@ def test_a_golden_file_holds_inputs_and_every_stage(checkpoint: Path, tmp_path: 
     assert tensors["stage.target.kept"].dtype == np.int32
     assert tensors["stage.fine.2.T"].shape == (4, 4)
     assert tensors["stage.fine.0.similarity"].shape == (16, 15)
+
+
+def test_a_golden_file_follows_the_settings_of_the_model_file(
+    checkpoint: Path, tmp_path: Path
+) -> None:
+    """Exported to match more points more often than the network was trained to."""
+    model, golden = tmp_path / "m.vnr", tmp_path / "g.vnr"
+    words = ["export", str(checkpoint), str(model), "--keep-divisor", "3", "--fine-iterations", "5"]
+    arguments = parser().parse_args(words)
+    arguments.run_command(arguments)
+    rng = np.random.default_rng(0)
+    golden_of_checkpoint(checkpoint, model, golden, *rng.normal(size=(2, 90, 3)))
+    _, tensors = read_model(golden)
+    assert len(tensors["stage.source.kept"]) == 30
+    assert "stage.fine.4.T" in tensors and "stage.fine.5.T" not in tensors

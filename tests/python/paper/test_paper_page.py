@@ -18,7 +18,9 @@ FOLDER = ROOT / "docs" / "paper"
 
 @pytest.fixture(scope="module")
 def figures() -> dict[str, Any]:
-    return read_figures(FOLDER, ROOT / "docs" / "results" / "results.json")
+    docs = ROOT / "docs"
+    results, benchmark = docs / "results/results.json", docs / "benchmark/benchmark.json"
+    return read_figures(FOLDER, results, benchmark)
 
 
 def page(figures: dict[str, Any]) -> str:
@@ -31,7 +33,7 @@ def test_the_page_is_made_of_its_figures(figures: dict[str, Any]) -> None:
 
 
 def test_every_part_is_there(figures: dict[str, Any]) -> None:
-    assert {*PARTS, "results"} == set(figures)
+    assert {*PARTS, "results", "kernel_rate"} == set(figures)
     assert len(figures["ablation"]["variants"]) >= 4
 
 

@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vnreg_train.export.descriptor_model import export_descriptor_model, load_descriptor_checkpoint
-from vnreg_train.export.model import Metadata, export_golden, export_model, load_checkpoint
+from vnreg_train.export.model import (
+    Metadata,
+    config_from_metadata,
+    export_golden,
+    export_model,
+    load_checkpoint,
+)
+from vnreg_train.model_file import read_model
 from vnreg_train.training.checkpoint import read_checkpoint
 
 
@@ -46,4 +53,9 @@ def golden_of_checkpoint(
 
         export_descriptor_golden(model, path, source, target)
     else:
-        export_golden(load_checkpoint(checkpoint)[0], model, path, source, target)
+        network, _ = load_checkpoint(checkpoint)
+        # A file may match more points more often than its network was trained for.
+        config = config_from_metadata(read_model(model)[0])
+        network.fine.iterations = config.fine_iterations
+        network.fine.keep_divisor = config.keep_divisor
+        export_golden(network, model, path, source, target)

@@ -125,15 +125,26 @@ def _figures(poses: Float64, truth: Float64) -> dict[str, Any]:
     return found | {"median_deg": float(np.median(np.nan_to_num(rotation, nan=180.0)))}
 
 
+def trained_pairs(run: Path, stage: str) -> int:
+    """How many pairs a stage's checkpoint has seen."""
+    state = read_checkpoint(run / f"{stage}.pt")
+    return int(state["step"] * state["config"][stage]["batch"])
+
+
 def read_curves(run: Path, stage: str) -> dict[str, list[list[float]]]:
-    """Of each figure of a stage's training, about CURVE_POINTS means as [last step, mean]."""
+    """Of each figure of a stage's training, about CURVE_POINTS means as [last step, mean].
+
+    Up to the checkpoint: a run that was stopped has logged more than its weights have seen.
+    """
+    last = read_checkpoint(run / f"{stage}.pt")["step"]
     events = EventAccumulator(str(run / "tensorboard" / stage), size_guidance={"scalars": 0})
     events.Reload()
     known = events.Tags()["scalars"]
     curves = {}
     for name in CURVES[stage]:
         # Runs of the first version have no groups.
-        points = events.Scalars(f"train/{name}" if f"train/{name}" in known else name)
+        logged = events.Scalars(f"train/{name}" if f"train/{name}" in known else name)
+        points = [point for point in logged if point.step <= last]
         parts = np.array_split(np.arange(len(points)), min(CURVE_POINTS, len(points)))
         curves[name] = [
             [points[part[-1]].step, float(np.mean([points[i].value for i in part]))]

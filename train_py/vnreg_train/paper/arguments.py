@@ -28,6 +28,13 @@ RECALL = Lesson(
     takes="Seconds.",
     example="paper-recall --run runs/paper/evaluate",
 )
+ITERATIONS = Lesson(
+    summary="measure what more points and iterations of the fine register bring",
+    reads="Model files of the paper's network, and the validation shapes.",
+    writes="OUT/iterations.json.",
+    takes="Two minutes of one core.",
+    example="paper-iterations models/small.vnr",
+)
 SPEED = Lesson(
     summary="time the engine with one shared encoder against two",
     reads="Nothing: time does not depend on the weights, which are random.",
@@ -52,7 +59,7 @@ PAGE = Lesson(
 
 
 def add_paper_commands(commands: Subcommands) -> None:
-    """paper-ablation, paper-recall, paper-speed, paper-training-speed, paper-page."""
+    """Those of every part of the page, and the page's own."""
     ablation = _add(commands, "paper-ablation", ABLATION, _ablation)
     ablation.add_argument("--config", default="ablation", help="the base configuration")
     ablation.add_argument("--run", default="runs/paper/ablation", help="folder of its trainings")
@@ -61,14 +68,25 @@ def add_paper_commands(commands: Subcommands) -> None:
     recall = _add(commands, "paper-recall", RECALL, _recall)
     recall.add_argument("--run", default="runs/paper/evaluate", help="folder of the answers")
     recall.add_argument("--trained", default="runs/small", help="folder of the network's training")
+    recall.add_argument("--refined", default="runs/refined", help="and of its fine register's")
     recall.add_argument("--longer", metavar="MODEL", help="the model file, if it is that one")
     _add_pairs(recall)
+    iterations = _add(commands, "paper-iterations", ITERATIONS, _iterations)
+    iterations.add_argument("model", help="a .vnr file")
+    iterations.add_argument(
+        "--before", metavar="MODEL", help="the same network before its fine register was refined"
+    )
+    iterations.add_argument("--seeds", nargs="+", type=int, default=[1, 2], help="of the pairs")
+    _add_pairs(iterations, split="validation")
     speed = _add(commands, "paper-speed", SPEED, _speed)
     speed.add_argument("--rounds", type=int, default=41, help="alignments by each network")
     training = _add(commands, "paper-training-speed", TRAINING_SPEED, _training_speed)
     training.add_argument("--steps", type=int, default=5, help="timed steps of each line")
     training.add_argument("--lines", type=int, nargs="+", help="only these, numbered from 1")
     page = _add(commands, "paper-page", PAGE, _page)
+    page.add_argument(
+        "--benchmark", default="docs/benchmark/benchmark.json", help="the kernels' speed"
+    )
     page.add_argument("--results", default="docs/results/results.json", help="the peers' figures")
 
 
@@ -81,10 +99,10 @@ def _add(
     return command
 
 
-def _add_pairs(command: argparse.ArgumentParser) -> None:
+def _add_pairs(command: argparse.ArgumentParser, split: str = "test") -> None:
     command.add_argument("--data", default="data/furniture", help="folder of the shapes")
     command.add_argument(
-        "--split", default="test", choices=("validation", "test"), help="whose pairs are measured"
+        "--split", default=split, choices=("validation", "test"), help="whose pairs are measured"
     )
     command.add_argument("--shapes", type=int, help="only so many of them, spread evenly")
 
@@ -124,7 +142,7 @@ def _recall(arguments: argparse.Namespace) -> None:
     from vnreg_train.evaluate.run import Pairing
     from vnreg_train.evaluate.symmetry import read_symmetries
     from vnreg_train.model_file import read_model
-    from vnreg_train.paper.ablation import STAGES, read_curves
+    from vnreg_train.paper.ablation import STAGES, read_curves, trained_pairs
 
     pairing = Pairing(arguments.split, arguments.shapes, 0, Path(arguments.data))
     results = collect_results(Path(arguments.run), pairing, read_symmetries())
@@ -140,8 +158,25 @@ def _recall(arguments: argparse.Namespace) -> None:
         _write(arguments, "longer", figures | {"settings": {k: metadata[k] for k in keys}})
         return
     _write(arguments, "recall", figures)
-    trained = Path(arguments.trained)
-    _write(arguments, "curve", {stage: read_curves(trained, stage) for stage in STAGES})
+    trained, refined = Path(arguments.trained), Path(arguments.refined)
+    runs = {stage: (trained, stage) for stage in STAGES} | {"refined": (refined, "fine")}
+    curves = {
+        "curves": {name: read_curves(*run) for name, run in runs.items()},
+        "pairs": {name: trained_pairs(*run) for name, run in runs.items()},
+    }
+    _write(arguments, "curve", curves)
+
+
+def _iterations(arguments: argparse.Namespace) -> None:
+    from vnreg_train.evaluate.run import Pairing
+    from vnreg_train.paper.iterations import ENDS, measure_iterations
+
+    pairing = Pairing(arguments.split, arguments.shapes, 0, Path(arguments.data))
+    figures = measure_iterations(Path(arguments.model), pairing, arguments.seeds)
+    if arguments.before:
+        before = measure_iterations(Path(arguments.before), pairing, arguments.seeds, ENDS)
+        figures["before"] = before["lines"]
+    _write(arguments, "iterations", figures)
 
 
 def _speed(arguments: argparse.Namespace) -> None:
@@ -164,6 +199,6 @@ def _page(arguments: argparse.Namespace) -> None:
     from vnreg_train.paper.page import markdown, read_figures
 
     folder = Path(arguments.out)
-    figures = read_figures(folder, Path(arguments.results))
+    figures = read_figures(folder, Path(arguments.results), Path(arguments.benchmark))
     notes = (folder / "notes.md").read_text(encoding="utf-8")
     folder.with_suffix(".md").write_text(markdown(figures, notes), encoding="utf-8")

@@ -12,11 +12,12 @@ from vnreg_train.evaluate.bars import LIMIT
 from vnreg_train.evaluate.report import PAPER_RECALL, interval, table
 from vnreg_train.evaluate.rows import PAPER_SETTINGS
 from vnreg_train.evaluate.titles import TITLES
+from vnreg_train.paper.note_values import note_values
 from vnreg_train.paper.published import BARS, BASELINES, SPEED_BAR
 from vnreg_train.paper.variants import BASE, VARIANTS
 
 Figures = Mapping[str, Any]
-PARTS = ("recall", "longer", "ablation", "speed", "training_speed", "curve")
+PARTS = ("recall", "longer", "iterations", "ablation", "speed", "training_speed", "curve")
 OURS = ("coarse", "paper")
 MODE_TITLES = {"coarse": "**ours**, coarse", "paper": "**ours**, coarse + fine"}
 PEERS = ("verified", "open3d_ransac_icp", "open3d_fgr_icp", "kiss_matcher_icp", "small_gicp")
@@ -30,19 +31,24 @@ ADDITIONS = (
 )
 
 
-def read_figures(folder: Path, results: Path) -> dict[str, Any]:
-    """The parts of a folder that are there, and as `results` what the peers reached."""
+def read_figures(folder: Path, results: Path, benchmark: Path) -> dict[str, Any]:
+    """The parts of a folder that are there, as `results` what the peers reached, and as
+    `kernel_rate` the GFLOP/s of our fastest product.
+    """
     found: dict[str, Any] = {}
     for part in PARTS:
         path = folder / f"{part}.json"
         if path.exists():
             found[part] = json.loads(path.read_text(encoding="utf-8"))
     found["results"] = json.loads(results.read_text(encoding="utf-8"))
+    kernels = json.loads(benchmark.read_text(encoding="utf-8"))["kernels"]["rows"]
+    products = [of for of in kernels if of["name"].startswith("packed_product")]
+    found["kernel_rate"] = max(float(of["GFLOP/s"]) for of in products)
     return found
 
 
 def markdown(figures: Figures, notes: str) -> str:
-    """The whole page; `notes` are the hand-written paragraphs at its end."""
+    """The whole page; `notes` are the paragraphs at its end, figures in braces."""
     parts = [
         "# The paper's tables",
         "What the paper claims, trained here and run by the engine. `make paper` writes this page "
@@ -59,7 +65,7 @@ def markdown(figures: Figures, notes: str) -> str:
     for part, title, section in sections:
         if part in figures:
             parts += [f"## {title}", section(figures)]
-    return "\n\n".join([*parts, notes.strip()]) + "\n"
+    return "\n\n".join([*parts, notes.strip().format_map(note_values(figures))]) + "\n"
 
 
 # ---- recall ----
@@ -79,6 +85,7 @@ def recall_section(figures: Figures) -> str:
             f"The last column is the same network, whose fine register matches more points more "
             f"often than the paper's N/6 and three times (median "
             f"{longer_ms(figures):.0f} ms a pair); chosen on validation shapes.",
+            iterations_text(figures["iterations"]),
             *(setting_table(figures, setting) for setting in PAPER_SETTINGS),
             "*Partial*, apart by whether both clouds were cropped towards the same side (they "
             "then share nearly all points) or towards opposite ones (two thirds):",
@@ -100,6 +107,23 @@ def bars_table(figures: Figures) -> str:
     settings = figures["longer"]["settings"]
     more = f"N/{settings['fine.keep_divisor']} points, {settings['fine.iterations']} iterations"
     return table(["180°", "coarse", "coarse + fine", "bar", "", "the paper", more], lines)
+
+
+def iterations_text(found: Figures) -> str:
+    settings = list(found["coarse"])
+    lines = [_iterations_line(of, settings, "") for of in found["lines"]]
+    lines += [_iterations_line(of, settings, ", before refining") for of in found["before"]]
+    return (
+        f"More points and iterations of the fine register with the same weights, on "
+        f"{found['pairs']} pairs of the {found['split']} split; and the same network before its "
+        "fine register was refined:\n\n"
+        + table(["points, iterations", *settings, "ms a pair"], lines)
+    )
+
+
+def _iterations_line(of: Figures, settings: Sequence[str], after: str) -> list[str]:
+    title = f"N/{of['keep_divisor']}, {of['iterations']}{after}"
+    return [title, *(interval(of["recall"][name]) for name in settings), f"{of['ms']:.0f}"]
 
 
 def longer_ms(figures: Figures) -> float:
@@ -143,15 +167,16 @@ def halves_table(figures: Figures) -> str:
 def curve_section(figures: Figures) -> str:
     """Two rows a figure: the steps, and the means since the step before."""
     lines = []
-    for stage, curves in figures["curve"].items():
+    for stage, curves in figures["curve"]["curves"].items():
         for figure, points in curves.items():
             lines.append([f"{stage}, until step", *(f"{step:,}" for step, _ in points)])
             lines.append([figure, *(_curve_value(figure, value) for _, value in points)])
     width = max(len(line) for line in lines)
     return (
-        "The training behind the table above, 16 pairs a step: loss of the coarse poses, then "
-        "of the matching, and the share of training pairs within the limits, in %.\n\n"
-        + table([""] * width, [line + [""] * (width - len(line)) for line in lines])
+        "The training behind the table above, 16 pairs a step: loss of the coarse poses, then of "
+        "the matching, then of the matching as it is refined on what the fine register meets at "
+        "test time (configs/refined.toml), and the share of training pairs within the limits, in "
+        "%.\n\n" + table([""] * width, [line + [""] * (width - len(line)) for line in lines])
     )
 
 

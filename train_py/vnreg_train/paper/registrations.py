@@ -39,10 +39,13 @@ def make_register(network: RegistrationNetwork, model_path: Path) -> Register:
         return _by_reference(Reference(network))
     model_path.parent.mkdir(parents=True, exist_ok=True)
     export_model(network, model_path, "ablation")
-    return _by_engine(vnreg.Registrar(vnreg.Model.load(model_path), mode="paper", threads=1))
+    return engine_register(model_path)
 
 
-def _by_engine(registrar: vnreg.Registrar) -> Register:
+def engine_register(model_path: Path) -> Register:
+    """By the engine in mode `paper`, on one thread."""
+    registrar = vnreg.Registrar(vnreg.Model.load(model_path), mode="paper", threads=1)
+
     def register(pair: Pair) -> Poses:
         result = registrar.align(pair.source, pair.target)
         if not result.has_pose:

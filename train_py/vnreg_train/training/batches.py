@@ -9,7 +9,7 @@ pair turned apart, as the evaluation's pairs are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,8 +40,8 @@ class Batch:
         """The same batch there; itself where it is there already."""
         if self.points.device == device:
             return self
-        parts: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
-        return Batch(**{k: v if v is None else v.to(device) for k, v in parts.items()})
+        moved: dict[str, Any] = {k: v.to(device) for k, v in vars(self).items() if v is not None}
+        return replace(self, **moved)
 
     def residual(self, rotation: Tensor, translation: Tensor) -> tuple[Tensor, Tensor]:
         """What separates a pose from the true one: R_gt^T R (B, 3, 3) and t - t_gt (B, 3)."""

@@ -93,8 +93,13 @@ class FineStage(nn.Module):
         return self.matching.trainable()
 
     def forward(self, batch: Batch) -> Losses:
+        bfloat16 = torch.autocast(
+            batch.edges.device.type, torch.bfloat16, enabled=self.matching.config.bfloat16
+        )
         with torch.no_grad():
-            latent, feature = self._encode(batch.edges)
+            with bfloat16:
+                latent, feature = self._encode(batch.edges)
+            feature = feature.float()
             g_source, g_target = feature.transpose(1, 2).chunk(2)
             pose = procrustes(g_source, g_target)
         return self.matching(batch, latent, feature, pose)
