@@ -47,6 +47,7 @@ std::vector<std::size_t> shuffled_finite(const PointsView& points) {
   }
   std::ranges::sort(candidates, {}, &Candidate::hash);
   std::vector<std::size_t> order;
+  order.reserve(candidates.size());
   for (const Candidate& candidate : candidates) order.push_back(candidate.index);
   return order;
 }
