@@ -201,7 +201,7 @@ PAPER_SHAPES := --shapes 3
 PAPER_PAIRS := --split validation $(PAPER_SHAPES)
 PAPER_ABLATION := --config smoke
 PAPER_ROUNDS := --rounds 1
-PAPER_STEPS := --steps 1 --lines 2
+PAPER_STEPS := --steps 1 --lines 4 5
 else
 PAPER := runs/paper
 PAPER_TRAIN := small

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from vnreg_train.cli import parser
+from vnreg_train.paper.extrapolate import SPEED
+from vnreg_train.paper.training_speed import RECIPES
 from vnreg_train.training.config import load_config
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -58,3 +60,11 @@ def test_the_small_budget_touches_neither_page_nor_test_shapes() -> None:
             assert words[words.index("--split") + 1] == "validation"
     config = load_config("smoke")
     assert config.coarse.steps * config.coarse.batch <= 100
+
+
+def test_the_small_budget_times_what_the_page_asks_for() -> None:
+    """The page's words name the speed of two of the recipes."""
+    call = next(words for words in trainer_calls("smoke") if words[0] == "paper-training-speed")
+    lines = parser().parse_args(call).lines
+    titles = {RECIPES[number - 1].title for number in lines}
+    assert {SPEED, SPEED.removesuffix(", bf16")} <= titles
