@@ -13,7 +13,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "training"))
 
-from tiny_run import bent_boxes, tiny_config
+from tiny_run import bent_boxes, tiny_config, trainer
 
 from vnreg_train.evaluate.run import Pairing
 from vnreg_train.paper import ablation
@@ -91,3 +91,13 @@ def test_engine_and_reference_agree_where_both_can(pairing: Pairing, tmp_path: P
         assert np.abs(one.coarse - two.coarse).max() < 1e-3
         assert not np.array_equal(one.fine, two.fine)
     assert not (tmp_path / "none.vnr").exists()
+
+
+def test_a_curve_ends_where_its_checkpoint_does(tmp_path: Path) -> None:
+    """A run that was stopped has logged steps that its weights have not seen."""
+    run = trainer(tmp_path, "coarse", replace(tiny_config(), validation_steps=0, log_steps=2))
+    run.run(progress=False)
+    run.step = 6
+    run.save()
+    curves = ablation.read_curves(tmp_path, "coarse")
+    assert {points[-1][0] for points in curves.values()} == {6}
