@@ -39,12 +39,12 @@ EncoderData read_encoder(TensorSet& tensors, const Architecture& a, const std::s
   const std::span<const float> pre = tensors.matrix(prefix + ".pre", 2 * c, 3);
   e.network0_first =
       kernels::make_edge_block(pre, read_block(tensors, a, prefix + ".network0.0", 2 * c, c));
+  const std::string network1 = prefix + ".network1.";
   for (std::size_t i = 0; i < 2; ++i) {
-    const std::string number = std::to_string(i);
     e.network0_rest[i] = kernels::make_vn_block(
         read_block(tensors, a, prefix + ".network0." + std::to_string(i + 1), 2 * c, c));
     e.network1[i] =
-        kernels::make_vn_block(read_block(tensors, a, prefix + ".network1." + number, 2 * c, c));
+        kernels::make_vn_block(read_block(tensors, a, network1 + std::to_string(i), 2 * c, c));
   }
   e.global_direction = tensors.packed(prefix + ".global.relu", direction_rows(a, c), c);
   e.global_fc = tensors.packed(prefix + ".global.fc", c, c);

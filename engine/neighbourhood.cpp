@@ -5,8 +5,6 @@
 namespace vnreg::detail {
 namespace {
 
-using kernels::SpatialIndex;
-
 constexpr Index leaves_per_task = 16;
 
 /// Network `vnreg` takes moments for neighbourhoods: only the spacing is left to find.

@@ -48,7 +48,7 @@ void write_place(Surface& s, Index i) noexcept {
 void take_points(const Cloud& cloud, float per_radius, Surface& s) noexcept {
   const Coordinates ordered = cloud.index.ordered();
   s.count = std::min(cloud.count, static_cast<Index>(s.x.size()));
-  const int bits = std::bit_width(static_cast<std::uint32_t>(s.count - 1));
+  const auto bits = static_cast<int>(std::bit_width(static_cast<std::uint32_t>(s.count - 1)));
   Index taken = 0;
   for (std::uint32_t v = 0; taken < s.count; ++v) {
     const auto place = static_cast<Index>(reversed(v, bits));

@@ -17,8 +17,6 @@ namespace vnreg::kernels {
 inline constexpr Index collect_group = 4;
 
 /// Room for the neighbours of a tile.
-// The name that clang-tidy 14 sees is clang's own, of the loop that copies the array.
-// NOLINTNEXTLINE(bugprone-reserved-identifier)
 struct CollectScratch {
   CollectScratch() = default;
   explicit CollectScratch(Index max_points);

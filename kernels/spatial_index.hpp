@@ -29,8 +29,6 @@ struct Box {
 /// The smallest box around `count` >= 1 points.
 Box box_of(const Coordinates& points, Index count) noexcept;
 
-// The name that clang-tidy 14 sees is clang's own, of the loop that copies the boxes.
-// NOLINTNEXTLINE(bugprone-reserved-identifier)
 class SpatialIndex {
  public:
   static constexpr Index leaf_size = 16;
