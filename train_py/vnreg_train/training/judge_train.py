@@ -12,13 +12,13 @@ from pathlib import Path
 import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
-from torch.optim.lr_scheduler import OneCycleLR
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from tqdm import trange
 
 from vnreg_train.model_file import MetadataValue, read_model, write_model
 from vnreg_train.networks.judge import JudgeNetwork
 from vnreg_train.training.judge_samples import KEPT_POINTS, JudgeSamples
+from vnreg_train.training.schedule import one_cycle
 
 KEY = "channels.judge"
 # What the judge has to decide on: every row of P1 and of views, and the paper's with its shared
@@ -80,7 +80,9 @@ def train_judge(
     optimizer = torch.optim.AdamW(
         network.parameters(), settings.learning_rate, weight_decay=settings.weight_decay
     )
-    schedule = OneCycleLR(optimizer, settings.learning_rate, settings.steps, pct_start=0.1)
+    schedule = one_cycle(
+        optimizer, settings.learning_rate, settings.steps, warmup=0.1, cycle_momentum=True
+    )
     for _ in trange(settings.steps, desc="judge", disable=not progress):
         pairs = torch.randint(0, len(samples), (settings.batch,))
         drawn = [torch.randperm(KEPT_POINTS)[: settings.points] for _ in range(2)]

@@ -11,8 +11,6 @@ from typing import Generic, TypeVar, cast
 
 import torch
 from torch import Tensor, nn
-from torch.optim import Optimizer
-from torch.optim.lr_scheduler import OneCycleLR
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from tqdm import tqdm
 
@@ -24,6 +22,7 @@ from vnreg_train.training.checkpoint import (
 )
 from vnreg_train.training.config import OptimisationConfig, RunConfig
 from vnreg_train.training.curves import Curves, mean_figures, weight_figures
+from vnreg_train.training.schedule import one_cycle
 
 NetworkT = TypeVar("NetworkT", bound=nn.Module)
 BatchT = TypeVar("BatchT")
@@ -34,18 +33,6 @@ def begin_run(config: RunConfig) -> None:
     """Threads and seed; call before the network is made."""
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
-
-
-def one_cycle(optimizer: Optimizer, settings: OptimisationConfig) -> OneCycleLR:
-    """The rate of every step. A rise of just one step is left out: torch divides by its end, 0."""
-    rises = settings.warmup * settings.steps != 1
-    return OneCycleLR(
-        optimizer,
-        max_lr=settings.learning_rate,
-        total_steps=settings.steps,
-        pct_start=settings.warmup if rises else 0.0,
-        cycle_momentum=False,
-    )
 
 
 class Trainer(ABC, Generic[NetworkT, BatchT]):
@@ -72,7 +59,9 @@ class Trainer(ABC, Generic[NetworkT, BatchT]):
         self.optimizer = torch.optim.AdamW(
             parameters, lr=settings.learning_rate, weight_decay=settings.weight_decay
         )
-        self.schedule = one_cycle(self.optimizer, settings)
+        self.schedule = one_cycle(
+            self.optimizer, settings.learning_rate, settings.steps, settings.warmup
+        )
         self.step = self.skipped = 0
         self._window: list[dict[str, float]] = []  # figures of the steps since the last log
         if self.checkpoint.exists():
