@@ -14,7 +14,8 @@ class CloudFileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// `text`, such as the name of a file, on one line: control characters become \xNN.
+/// `text`, such as the name of a file, on one line: control characters, those of U+0080 to U+009F
+/// too, become \xNN.
 std::string one_line(std::string_view text);
 
 /// `text` from inside a file, in single quotes: bytes that are not printable ASCII become \xNN,
