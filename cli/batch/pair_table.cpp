@@ -46,9 +46,16 @@ std::optional<Columns> columns_of(const Fields& first, std::size_t line) {
 
 const std::string& field_at(const Fields& fields, std::size_t column, const char* name,
                             std::size_t line) {
-  if (column < fields.size() && !fields[column].empty()) return fields[column];
-  cloud_file::fail_at_line(
-      line, std::string("a ") + name + " in column " + std::to_string(column + 1), "none");
+  if (column >= fields.size() || fields[column].empty()) {
+    cloud_file::fail_at_line(
+        line, std::string("a ") + name + " in column " + std::to_string(column + 1), "none");
+  }
+  // The system would open what stands before it.
+  if (fields[column].find('\0') != std::string::npos) {
+    cloud_file::fail_at_line(line, std::string("a ") + name + " without a zero byte",
+                             cloud_file::quoted(fields[column]));
+  }
+  return fields[column];
 }
 
 Pair pair_of(const Fields& fields, const Columns& columns, std::size_t row, std::size_t line) {

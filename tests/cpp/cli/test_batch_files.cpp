@@ -148,6 +148,16 @@ TEST_CASE("a record of other settings is shown in a short line of ASCII", "[batc
   CHECK(message("[").starts_with(": expected the settings of the run that wrote the rows"));
 }
 
+TEST_CASE("a file whose name holds a zero byte is refused, not the one named before it",
+          "[batch]") {
+  using namespace std::string_literals;
+  CHECK_THROWS_WITH(parse_pairs("a.ply,b.ply\na.ply\0x,b.ply\n"s),
+                    "line 2: expected a source without a zero byte, found 'a.ply\\x00x'");
+  CHECK_THROWS_WITH(parse_pairs("source,target\na.ply,\0\n"s),
+                    "line 2: expected a target without a zero byte, found '\\x00'");
+  CHECK(parse_pairs("a.ply,b.ply\n").size() == 1);
+}
+
 TEST_CASE("rows go on behind what was done, and a row of another run is refused", "[batch]") {
   const TemporaryFolder folder;
   const PairTable table{{{"0", "a.ply", "b.ply"}, {"1", "c.ply", "d.ply"}}, ""};
