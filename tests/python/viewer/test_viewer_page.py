@@ -102,14 +102,18 @@ def test_list_switches_poses(open_page: Opened, mug_file: Path) -> None:
     page = open_page(mug_file, reduced_motion="reduce")
     answer, shown = np.array(state(page)["sourceMatrix"]), picture(page)
     data = json.loads(page.locator("#pair").text_content() or "")
-    other = page.locator(".pose").nth(1)
+    last = (
+        page.locator(".pose").count() - 1
+    )  # the first of the others may be a twin, and look alike
+    assert last >= 1
+    other = page.locator(".pose").nth(last)
     other.click()
-    assert state(page)["pose"] == 1
+    assert state(page)["pose"] == last
     assert other.get_attribute("aria-pressed") == "true"
     assert page.locator(".pose").nth(0).get_attribute("aria-pressed") == "false"
     m = np.array(state(page)["sourceMatrix"]).reshape(4, 4).T[:3, :3]
     turn = m / np.cbrt(np.linalg.det(m))
-    expected = np.array(data["result"]["alternatives"][0]["pose"]).reshape(4, 4)[:3, :3]
+    expected = np.array(data["explanation"]["hypotheses"][last]["pose"]).reshape(4, 4)[:3, :3]
     np.testing.assert_allclose(turn, expected, atol=1e-6)
     assert np.abs(blocks(picture(page)) - blocks(shown)).mean() > ALIKE
     page.locator(".pose").nth(0).click()
@@ -140,8 +144,14 @@ def test_residuals_are_those_of_the_chosen_pose(open_page: Opened, mug_file: Pat
     page = open_page(mug_file, reduced_motion="reduce")
     page.keyboard.press("2")
     right = red(page)
-    page.keyboard.press("j")
-    assert red(page) > 1.5 * right
+    reds = []
+    for _ in json.loads(page.locator("#pair").text_content() or "")["explanation"]["hypotheses"][
+        1:
+    ]:
+        page.keyboard.press("j")
+        reds.append(red(page))
+    assert min(reds) > right  # a twin lays most points right, too
+    assert max(reds) > 1.5 * right
 
 
 def test_matches(open_page: Opened, mug_file: Path) -> None:
