@@ -11,6 +11,7 @@
 #include "batch/run_record.hpp"
 #include "command.hpp"
 #include "messages.hpp"
+#include "temporary_folder.hpp"
 
 namespace vnreg::fuzz {
 namespace {
@@ -21,28 +22,6 @@ using cli::ResultsFile;
 using cli::RowFormat;
 
 const cli::PairTable table{{{"0", "a.ply", "b.ply"}, {"x, \"y\"", "c d.npy", "\xff.ply"}}, ""};
-
-/// A folder of this process, in memory where the system has one: every input makes files.
-class Folder {
- public:
-  Folder() {
-    const bool in_memory = std::filesystem::is_directory("/dev/shm");
-    std::string name = in_memory ? "/dev/shm/vnreg_fuzz_XXXXXX" : "/tmp/vnreg_fuzz_XXXXXX";
-    require(::mkdtemp(name.data()) != nullptr, "there is room for a folder");
-    path_ = name + '/';
-  }
-  ~Folder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 void write(const std::string& path, std::string_view bytes) {
   std::ofstream(path, std::ios::binary) << bytes;
@@ -74,12 +53,12 @@ struct Files {
   RowFormat format;
 };
 
-Files files_in(const std::string& folder, char kind) {
-  if (kind == 'c') return {folder + "a.csv", folder + "a.csv", RowFormat::csv};
+Files files_in(const test::TemporaryFolder& folder, char kind) {
+  if (kind == 'c') return {folder / "a.csv", folder / "a.csv", RowFormat::csv};
   if (kind == 'p') {
-    return {folder + "a.parquet", folder + "a.parquet.rows.jsonl", RowFormat::jsonl};
+    return {folder / "a.parquet", folder / "a.parquet.rows.jsonl", RowFormat::jsonl};
   }
-  return {folder + "a.jsonl", folder + "a.jsonl", RowFormat::jsonl};
+  return {folder / "a.jsonl", folder / "a.jsonl", RowFormat::jsonl};
 }
 
 /// Goes on with the rows that are there; returns how many those were.
@@ -138,8 +117,8 @@ void go_on(const Files& files, std::string_view rows) {
 }
 
 void read_what_is_left(char kind, std::string_view bytes) {
-  static const Folder folder;
-  const Files files = files_in(folder.path(), kind);
+  static const test::TemporaryFolder folder;  // every input makes files in it
+  const Files files = files_in(folder, kind);
   std::filesystem::remove(files.results);
   const bool is_record = kind == 'r';
   const std::string rows = is_record ? cli::row_line(row_of(0), files.format) : std::string(bytes);

@@ -12,6 +12,8 @@ targets=("$@")
   targets=(ply pcd obj off text npy detect pairs results model architecture kernels builds align)
 mkdir -p "$build/findings"
 export OMP_NUM_THREADS=1
+# In memory, where the system has such a folder: every input of `results` makes files.
+[ ! -d /dev/shm ] || export TMPDIR=/dev/shm
 # The levels that this processor has, of the preset fuzz-builds beside the build.
 libraries=$build/../fuzz-builds/engine/libvnreg.so
 for level in $(/lib64/ld-linux-x86-64.so.2 --help | sed -n 's/^ *\(x86-64-v[34]\) (supported.*/\1/p'); do

@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,9 +43,9 @@ def open_page(browser: Browser) -> Iterator[Opened]:
     problems: list[str] = []
     contexts = []
 
-    def open_file(path: Path, wait_for: str = VIEWER_IS_UP, **options: object) -> Page:
-        settings = {"viewport": {"width": 900, "height": 600}, **options}
-        context = browser.new_context(offline=True, **settings)  # type: ignore[arg-type]
+    def open_file(path: Path, wait_for: str = VIEWER_IS_UP, **options: Any) -> Page:
+        settings: dict[str, Any] = {"viewport": {"width": 900, "height": 600}, **options}
+        context = browser.new_context(offline=True, **settings)
         contexts.append(context)
         page = context.new_page()
         page.set_default_timeout(20_000)

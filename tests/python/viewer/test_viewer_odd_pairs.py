@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from playwright.sync_api import Browser
 from processor_use import OtherPrograms
 from viewer_pictures import Opened, drawn, picture, state
 
@@ -148,8 +149,8 @@ def test_far_outliers_do_not_shrink_the_picture(
     assert "1 not finite" in page.locator("#facts").inner_text()
 
 
-def test_without_webgl_the_numbers_are_shown(browser: object, mug_file: Path) -> None:
-    page = browser.new_page()  # type: ignore[attr-defined]
+def test_without_webgl_the_numbers_are_shown(browser: Browser, mug_file: Path) -> None:
+    page = browser.new_page()
     page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     page.goto(mug_file.as_uri())
     assert page.locator("#no-webgl").is_visible()

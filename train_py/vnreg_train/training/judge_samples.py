@@ -78,9 +78,8 @@ def _recorded(registrar: vnreg.Registrar) -> tuple[Float16, Float64, Float64] | 
     stages = registrar.stages()
     if "judge.inputs" not in stages:
         return None
-    inputs, fit, poses = (
-        np.asarray(stages[f"judge.{name}"], np.float64) for name in ("inputs", "fit", "poses")
-    )
+    inputs = np.asarray(stages["judge.inputs"])
+    fit, poses = (np.asarray(stages[f"judge.{name}"], np.float64) for name in ("fit", "poses"))
     kept = _kept(int(stages["judge.source_points"].item()), len(inputs) // len(fit))
     kept_inputs = inputs.reshape(len(fit), -1, POINT_INPUTS)[:, kept].astype(np.float16)
     return kept_inputs, fit, poses
