@@ -172,8 +172,9 @@ Points read_matrix(std::string_view body, std::size_t offset, const Header& head
   const std::uint64_t rows = (*header.shape)[0];
   const std::uint64_t columns = (*header.shape)[1];
   const std::size_t size = size_of(type);
+  if (rows == 0) return {};  // of any width: no product of it below may wrap
   const std::uint64_t available = body.size() / size;
-  if (rows > 0 && (columns > available || rows > available / columns)) {
+  if (columns > available || rows > available / columns) {
     fail_at_byte(offset,
                  std::string("an array of shape ") + shape_text(*header.shape) + ", " +
                      std::to_string(size) + " bytes per number",
