@@ -100,7 +100,9 @@ viewer-picture: demo setup ## docs/viewer.webp, the demo's pair as the viewer sh
 	$(call install_debian,$(VIEWER_DEBIAN))
 	$(PY) viewer/take_picture.py build/demo/aligned_turned.html docs/viewer.webp
 
-check: setup ## formatting, lints, types
+check: setup debian-packages ## formatting, lints, types
+	$(call install_debian,clang-format-14)
+	git ls-files '*.[ch]' '*.[ch]pp' | xargs clang-format-14 --dry-run -Werror
 	$(PY) -m ruff check train_py python tests/python tests/soak bench examples docs viewer
 	$(PY) -m ruff format --check train_py python tests/python tests/soak bench examples docs viewer
 	$(PY) -m mypy train_py/vnreg_train python/vnreg/_batch

@@ -120,7 +120,8 @@ std::int32_t count_within(const float* squared, Index count, float limit) noexce
 }
 
 // Smallest distances are taken by their bits, which are ordered like numbers from 0 on: OpenMP's
-// least float32 starts at the largest finite number with some compilers and at infinity with others.
+// least float32 starts at the largest finite number with some compilers and at infinity with
+// others.
 std::int32_t bits_of(float squared) noexcept { return std::bit_cast<std::int32_t>(squared); }
 
 /// The smallest distance above `limit`, or infinity.
