@@ -220,7 +220,7 @@ paper-train: train-paper
 	$(TRAINER) export $(PAPER_REFINED)/fine.pt $(PAPER)/small.vnr --name small --keep-divisor 6
 	$(TRAINER) export $(PAPER_TRAINED)/fine.pt $(PAPER)/unrefined.vnr --name unrefined
 	$(TRAINER) export $(PAPER_REFINED)/fine.pt $(PAPER)/longer.vnr --name longer \
-	  --keep-divisor 3 --fine-iterations 16
+	  --keep-divisor 6 --fine-iterations 16
 
 paper-recall: python data
 	$(TRAINER) evaluate --rows p0 --methods coarse paper --paper-model $(PAPER)/small.vnr \

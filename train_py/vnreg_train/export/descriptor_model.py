@@ -138,7 +138,7 @@ def export_descriptor_model(
     path: Path,
     name: str,
     points: int = 1024,
-    encoded: int = 384,
+    encoded: int = 256,
     extra: Metadata | None = None,
 ) -> None:
     """Writes the network to `path`; equal weights give equal bytes.

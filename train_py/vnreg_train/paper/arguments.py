@@ -169,12 +169,14 @@ def _recall(arguments: argparse.Namespace) -> None:
 
 def _iterations(arguments: argparse.Namespace) -> None:
     from vnreg_train.evaluate.run import Pairing
-    from vnreg_train.paper.iterations import ENDS, measure_iterations
+    from vnreg_train.paper.iterations import BEFORE_REFINING, measure_iterations
 
     pairing = Pairing(arguments.split, arguments.shapes, 0, Path(arguments.data))
     figures = measure_iterations(Path(arguments.model), pairing, arguments.seeds)
     if arguments.before:
-        before = measure_iterations(Path(arguments.before), pairing, arguments.seeds, ENDS)
+        before = measure_iterations(
+            Path(arguments.before), pairing, arguments.seeds, BEFORE_REFINING
+        )
         figures["before"] = before["lines"]
     _write(arguments, "iterations", figures)
 

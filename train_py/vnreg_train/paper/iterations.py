@@ -23,7 +23,7 @@ from vnreg_train.paper.registrations import Poses, engine_register
 SETTINGS = ("noisy", "independent", "partial")
 # (keep divisor, iterations); the first are the paper's.
 CHOICES = ((6, 3), (6, 6), (6, 16), (3, 3), (3, 10), (3, 16))
-ENDS = (CHOICES[0], CHOICES[-1])
+BEFORE_REFINING = (CHOICES[0], CHOICES[2])
 NEAR_DEG = 30.0
 
 
