@@ -155,7 +155,9 @@ TEST_CASE("the judged points have descriptors of their own, and the pair's noise
   const detail::Workspace& w = pair.workspace();
   for (std::size_t side = 0; side < 2; ++side) {
     const detail::JudgedCloud& c = w.verified.judge.cloud[side];
-    REQUIRE(c.points.count == detail::most_judged_points);
+    // All described points, but those that the surface leaves out.
+    REQUIRE(c.points.count <= detail::most_judged_points);
+    REQUIRE(c.points.count > detail::most_judged_points * 9 / 10);
     const detail::CloudDescriptors& d = w.descriptors.features[side].out;
     const auto unit = static_cast<float>(w.verified.radius);
     for (std::size_t i = 0; i < static_cast<std::size_t>(c.points.count); ++i) {
