@@ -9,6 +9,11 @@ target_compile_options(vnreg_baseline_flags INTERFACE
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-fno-gnu-unique>
   $<$<BOOL:${VNREG_WERROR}>:-Werror>)
 target_compile_definitions(vnreg_baseline_flags INTERFACE EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY)
+# Short of registers, GCC 12 moves numbers through those of MMX in code without AVX, and does not give
+# them back: from then on a caller's long double is NaN.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  target_compile_options(vnreg_baseline_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-mno-mmx>)
+endif()
 
 # With the instruction set, private, so that users of the installed library never inherit it.
 add_library(vnreg_build_flags INTERFACE)

@@ -18,35 +18,45 @@ class Deadline {
 
   /// Begins a call. Without a budget and a cancellation in the options nothing ever expires.
   void start(const Options& options) noexcept {
-    expired_.store(false, std::memory_order_relaxed);
+    end_.store(End::none, std::memory_order_relaxed);
     cancellation_ = options.cancellation;
     has_budget_ = options.time_budget_ms > 0;
     if (has_budget_) {
       using Milliseconds = std::chrono::duration<double, std::milli>;
-      end_ = Clock::now() +
-             std::chrono::duration_cast<Clock::duration>(Milliseconds(options.time_budget_ms));
+      time_ = Clock::now() +
+              std::chrono::duration_cast<Clock::duration>(Milliseconds(options.time_budget_ms));
     }
   }
 
   /// Whether the limit is reached; from then on the call counts as expired. Any thread.
   bool passed() noexcept {
     if (expired()) return true;
-    if (!cancelled() && !(has_budget_ && Clock::now() >= end_)) return false;
-    expired_.store(true, std::memory_order_relaxed);
+    const End found = now();
+    if (found == End::none) return false;
+    End first = End::none;  // only what was seen first counts: a cancellation may be taken back
+    end_.compare_exchange_strong(first, found, std::memory_order_relaxed);
     return true;
   }
 
   /// Whether passed() has been true in this call: then some work was left out.
-  bool expired() const noexcept { return expired_.load(std::memory_order_relaxed); }
+  bool expired() const noexcept { return end_.load(std::memory_order_relaxed) != End::none; }
 
-  bool cancelled() const noexcept { return cancellation_ != nullptr && cancellation_->requested(); }
+  /// Whether that was because of a cancellation, also one that has been taken back since.
+  bool cancelled() const noexcept { return end_.load(std::memory_order_relaxed) == End::cancelled; }
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  std::atomic<bool> expired_{false};
+  enum class End : char { none, cancelled, out_of_time };
+
+  End now() const noexcept {
+    if (cancellation_ != nullptr && cancellation_->requested()) return End::cancelled;
+    return has_budget_ && Clock::now() >= time_ ? End::out_of_time : End::none;
+  }
+
+  std::atomic<End> end_{End::none};
   bool has_budget_ = false;
-  Clock::time_point end_{};
+  Clock::time_point time_{};
   const Cancellation* cancellation_ = nullptr;
 };
 

@@ -23,6 +23,7 @@ from vnreg_bench.timing import (
 )
 from vnreg_train.evaluate.methods import Mode
 from vnreg_train.evaluate.pairs import make_pairs
+from vnreg_train.model_file import read_model
 
 LATENCY_ROW = "P1/noise_0.01"
 MODES: dict[str, tuple[Mode, str]] = {  # of the sweeps: label -> (mode, model)
@@ -56,6 +57,7 @@ def time_against_points(settings: Settings) -> dict[str, Any]:
     times = interleaved(work, settings.rounds)
     return {
         "modes": {label: list(MODES[label]) for label in MODES},
+        "described": read_model(SHIPPED[MODES["verified"][1]])[0]["input.encoded"],
         "times": {key: summary(t) for key, t in times.items()},
         "stages": stages,
     }

@@ -110,7 +110,7 @@ def points_section(report: Report) -> list[str]:
     ]
     return [
         "Milliseconds of one call from Python, by points of each cloud, none left out (mode "
-        "verified describes 384 of them and judges by at most 2,048).",
+        f"verified describes {of['described']} of them and judges by at most 2,048).",
         table(head, lines),
         "Stages, milliseconds:",
         table(("mode / points", *stages), stage_lines),

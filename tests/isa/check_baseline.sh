@@ -1,7 +1,8 @@
 #!/bin/sh
 # check_baseline.sh LEVEL LIBRARY FILE...: no FILE has an instruction that came with AVX or later; nor has
 # LIBRARY, the engine as it is compiled for LEVEL, if that is x86-64-v2. If it is a higher level, LIBRARY
-# must have many: else the search would not find them.
+# must have many: else the search would not find them. None of all these touches the registers of MMX,
+# which are those of the caller's long double.
 set -eu
 level=$1 library=$2
 shift 2
@@ -10,6 +11,12 @@ count() {
   objdump -d --no-show-raw-insn "$1" | grep -Ec "%[yz]mm|\sv[a-z0-9]+ .*%xmm|$bmi" || true
 }
 
+for file in "$library" "$@"; do
+  if objdump -d --no-show-raw-insn "$file" | grep -E '%mm[0-7]' >&2; then
+    echo "$file: instructions of MMX" >&2
+    exit 1
+  fi
+done
 if [ "$level" = x86-64-v2 ]; then
   set -- "$library" "$@"
 elif [ "$(count "$library")" -lt 1000 ]; then
