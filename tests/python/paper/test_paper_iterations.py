@@ -36,7 +36,12 @@ def test_choices_share_their_coarse_poses_and_differ_in_time(
     model = tmp_path / "model.vnr"
     export_model(random_network(tiny_config().network), model, "iterations")
     found = measure_iterations(model, pairing, [1, 2, 3], [(6, 1), (2, 16)])
-    assert found["pairs"] == 6 and set(found["coarse"]) == {"noisy", "independent", "partial"}
+    assert found["pairs"] == 6 and set(found["coarse"]) == {
+        "clean",
+        "noisy",
+        "independent",
+        "partial",
+    }
     assert all(0 <= of["within_30_deg"] <= 1 for of in found["coarse"].values())
     none, many = found["lines"]
     assert (none["keep_divisor"], many["iterations"]) == (6, 16)

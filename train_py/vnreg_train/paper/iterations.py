@@ -20,7 +20,7 @@ from vnreg_train.evaluate.scores import LIMITS, within
 from vnreg_train.model_file import read_model, write_model
 from vnreg_train.paper.registrations import Poses, engine_register
 
-SETTINGS = ("noisy", "independent", "partial")
+SETTINGS = ("clean", "noisy", "independent", "partial")
 # (keep divisor, iterations); the first are the paper's.
 CHOICES = ((6, 3), (6, 6), (6, 16), (3, 3), (3, 10), (3, 16))
 BEFORE_REFINING = (CHOICES[0], CHOICES[2])

@@ -12,6 +12,7 @@ from vnreg_train.paper.extrapolate import (
     points_per_doubling,
 )
 from vnreg_train.paper.published import BARS, EPOCHS, SHAPES
+from vnreg_train.paper.training_speed import PAPER
 
 Figures = Mapping[str, Any]
 
@@ -47,6 +48,7 @@ def _recall_values(figures: Figures) -> dict[str, str]:
 
 def _training_values(figures: Figures) -> dict[str, str]:
     pairs = figures["curve"]["pairs"]
+    rate = figures["training_speed"]["recipes"][PAPER.title]["pairs_per_second"]
     return {
         "coarse_pairs": f"{pairs['coarse']:,}",
         "fine_pairs": f"{pairs['fine']:,}",
@@ -54,6 +56,7 @@ def _training_values(figures: Figures) -> dict[str, str]:
         "paper_pairs": f"{EPOCHS * SHAPES / 1e6:.1f} million",
         "doubling": f"{points_per_doubling(figures['curve']['curves']['coarse']['recall']):.0f}",
         "budgets": budget_table(figures),
+        "paper_width_hours": f"{sum(pairs.values()) / rate / 3600:.0f}",
     }
 
 

@@ -82,9 +82,9 @@ def recall_section(figures: Figures) -> str:
             "The paper and its baselines are on ModelNet40, trained on a GPU; our data is the "
             "furniture, with many symmetric shapes. Peers: [results](results.md).",
             bars_table(figures),
-            f"The last column is the same network with a longer search of its fine register; the "
-            f"paper's takes N/6 points and 3 iterations (median {longer_ms(figures):.0f} ms a pair; "
-            "chosen on validation shapes).",
+            "The last column is the same network with a longer search of its fine register; the "
+            f"paper's takes N/6 points and 3 iterations (median {longer_ms(figures):.0f} ms a "
+            "pair; chosen on validation shapes).",
             iterations_text(figures["iterations"]),
             *(setting_table(figures, setting) for setting in PAPER_SETTINGS),
             "*Partial*, apart by whether both clouds were cropped towards the same side (they "
