@@ -50,8 +50,9 @@ build: debian-packages ## the library and the program, at build/release/vnreg
 	cmake --preset $(PRESET) > /dev/null
 	cmake --build --preset $(PRESET)
 
+# By the name that cmake gives the compiler in the other builds, so that ccache has the engine already.
 python: setup ## the Python module `vnreg`, into .venv
-	$(PY) -m pip install -q --no-build-isolation .
+	CXX=c++ $(PY) -m pip install -q --no-build-isolation .
 
 # The demo needs the program alone, and few Python packages.
 build/demo-env/.installed: requirements/demo.txt | debian-packages
@@ -71,7 +72,8 @@ test-cpp: build
 
 test-python: python build test-data
 	$(call install_debian,$(VIEWER_DEBIAN))
-	$(PY) -m pytest -q tests/python
+	$(PY) -m pytest -q -m alone tests/python
+	$(PY) -m pytest -q -m "not alone" -n auto --maxprocesses 4 --dist worksteal tests/python
 
 test-isa: setup ## the tests that run the engine, on every instruction set of this processor
 	@command -v qemu-x86_64 > /dev/null || { $(SUDO) apt-get update -q && \

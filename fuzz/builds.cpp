@@ -115,23 +115,35 @@ struct Body {
   }
 };
 
-double angle_deg(const double* a, const double* b) {
-  const Eigen::Matrix3d turn = Eigen::Map<const Matrix4>(a).topLeftCorner<3, 3>().transpose() *
-                               Eigen::Map<const Matrix4>(b).topLeftCorner<3, 3>();
-  return Eigen::AngleAxisd(turn).angle() * 180 / std::numbers::pi;
+Eigen::Matrix3d rotation(const double* T) {
+  return Eigen::Map<const Matrix4>(T).topLeftCorner<3, 3>();
 }
 
-/// What a result says of its own rotation: one standard deviation; 0 where it says nothing.
-double deviation_deg(const vnreg_result& result) {
-  const double variance = result.covariance[0] + result.covariance[7] + result.covariance[14];
-  return variance > 0 ? std::sqrt(variance) * 180 / std::numbers::pi : 0;
+/// From rotation a to rotation b, in the target's frame, in radians.
+Eigen::Vector3d turn_between(const double* a, const double* b) {
+  const Eigen::AngleAxisd turn(rotation(b) * rotation(a).transpose());
+  return turn.angle() * turn.axis();
+}
+
+double angle_deg(const double* a, const double* b) {
+  return turn_between(a, b).norm() * 180 / std::numbers::pi;
+}
+
+/// Whether b lies within one standard deviation of the rotation of a, along every axis as far as a
+/// itself says how flat its optimum is there. False where it says nothing.
+bool within_deviation(const vnreg_result& a, const vnreg_result& b) {
+  const Eigen::Matrix3d covariance =
+      Eigen::Map<const Eigen::Matrix<double, 6, 6>>(a.covariance).topLeftCorner<3, 3>();
+  if (!covariance.allFinite()) return false;
+  const Eigen::Vector3d turn = turn_between(a.T_target_source, b.T_target_source);
+  return turn.dot(covariance.ldlt().solve(turn)) <= 1;
 }
 
 /// The same pose, or one as near as a flat optimum is told to be wide, or one that the other build
 /// ranks beside its own.
 bool agrees(const vnreg_result& a, const vnreg_result& b) {
-  const double apart = angle_deg(a.T_target_source, b.T_target_source);
-  if (apart <= std::max(largest_angle_deg, deviation_deg(a))) return true;
+  if (angle_deg(a.T_target_source, b.T_target_source) <= largest_angle_deg) return true;
+  if (within_deviation(a, b)) return true;
   for (std::size_t i = 0; i < b.alternative_count; ++i) {
     if (angle_deg(a.T_target_source, b.alternatives[i].T_target_source) <= 1) return true;
   }

@@ -147,6 +147,7 @@ def test_a_pickle_of_another_kind_is_refused(pair: Any) -> None:
         vnreg.Result.__new__(vnreg.Result).__setstate__({"status": "ok"})
 
 
+@pytest.mark.alone
 def test_the_call_costs_no_more_than_fifty_microseconds_of_python() -> None:
     """Beside the time that the engine reports, with two clouds of 1,024 points."""
     points = np.random.default_rng(1).normal(size=(1024, 3)).astype(np.float32)

@@ -13,6 +13,7 @@ import vnreg
 LIMIT_US = 50
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_the_overhead_of_a_call_is_small(dtype: type, order: str) -> None:

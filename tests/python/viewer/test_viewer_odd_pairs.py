@@ -190,6 +190,7 @@ ORBIT = """seconds => new Promise(resolve => {
 })"""
 
 
+@pytest.mark.alone
 def test_large_pairs_orbit_fluently(open_page: Opened, tmp_path: Path) -> None:
     """Two clouds of 100,000 points, software rendering: 30 frames per second or more.
 
