@@ -18,7 +18,7 @@ SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 .PHONY: help test-data setup debian-packages build python demo test test-cpp test-python test-isa soak \
         viewer viewer-three viewer-picture \
-        check sanitize sanitize-readers tsan coverage tidy analyse valgrind stress \
+        check sanitize tsan coverage tidy analyse valgrind stress \
         fuzz fuzzers fuzz-builds fuzz-coverage nightly \
         bench bench-compare batch-kills evaluate gallery train train-paper data \
         paper paper-train paper-recall paper-ablation paper-speed paper-page model docs wheel clean
@@ -110,16 +110,9 @@ check: setup debian-packages ## formatting, lints, types
 	$(PY) -m mypy train_py/vnreg_train python/vnreg/_batch
 
 # The same build as the fuzz targets'.
-sanitize: debian-packages ## the C++ tests under address and undefined-behaviour sanitizers
-	$(call install_debian,$(FUZZ_DEBIAN))
-	cmake --preset fuzz > /dev/null
+sanitize: fuzzers ## the C++ tests under address and undefined-behaviour sanitizers
 	cmake --build --preset sanitize
-	ctest --preset sanitize
-
-# What continuous integration has the minutes for: the readers of files from strangers.
-sanitize-readers: fuzzers
-	cmake --build --preset sanitize --target test_model_format test_cloud_file test_batch_files
-	ctest --preset sanitize -j2 -R '^(model_format|cloud_file|batch_files)$$'
+	ctest --preset sanitize -j2
 
 # Of clang, whose OpenMP tells the sanitizer where threads meet (libarcher); GCC's does not.
 tsan: debian-packages ## the C++ tests under the thread sanitizer

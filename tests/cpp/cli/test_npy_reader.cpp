@@ -86,7 +86,7 @@ TEST_CASE("NPY: the spelling of the header is free", "[npy]") {
 
 TEST_CASE("NPY: no rows, and bytes after the array", "[npy]") {
   check_equal(parse_cloud(npy(1, dict("<f8", false, "(0, 3)"), ""), ""), {});
-  // Rows so wide that the count of their bytes would wrap: `make sanitize-readers` would see it.
+  // Rows so wide that the count of their bytes would wrap: `make sanitize` would see it.
   check_equal(parse_cloud(npy(1, dict("<f8", false, "(0, 18446744073709551615)"), ""), ""), {});
   check_equal(parse_cloud(good + "more", ""), two_points);
 }
