@@ -162,7 +162,7 @@ fuzz-builds: debian-packages
 fuzz: fuzzers $(if $(TARGETS),$(filter fuzz-builds,$(TARGETS:%=fuzz-%)),fuzz-builds) ## all fuzz targets for SECONDS=60 each, from their corpora; TARGETS="ply model": only these; JOBS=2: two at a time
 	fuzz/run.sh build/fuzz $(SECONDS) $(TARGETS)
 
-fuzz-coverage: debian-packages ## the lines of the readers that the corpora of the fuzz targets cover
+fuzz-coverage: debian-packages ## the lines that the corpora of the fuzz targets cover
 	$(call install_debian,$(FUZZ_DEBIAN))
 	cmake --preset fuzz-coverage > /dev/null
 	cmake --build --preset fuzz-coverage
