@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ import vnreg
 from vnreg_bench.inputs import SHIPPED, Cloud, bent_box, random_paper_model
 from vnreg_bench.machine import pin
 from vnreg_bench.settings import Settings
+from vnreg_bench.side_by_side import processes_at_once
 from vnreg_bench.timing import (
     WARM_UP,
     Times,
@@ -86,7 +88,8 @@ def time_against_channels(settings: Settings) -> dict[str, Any]:
 
 
 def time_against_threads(settings: Settings) -> dict[str, Any]:
-    """Milliseconds by mode and threads, 1,024 points; `paper128` is the paper's own width."""
+    """Milliseconds by mode and threads, 1,024 points; `paper128` is the paper's own width. And what
+    as many processes gain, which share nothing but the machine."""
     pin(max(settings.threads))
     pair, work = bent_box(1024), {}
     with tempfile.TemporaryDirectory() as folder:
@@ -99,7 +102,10 @@ def time_against_threads(settings: Settings) -> dict[str, Any]:
         paper = vnreg.Registrar(wide, mode="paper", threads=threads)
         work[f"paper128/{threads}"] = aligner(paper, pair)
     times = interleaved(work, settings.rounds)
-    return {"times": {key: summary(t) for key, t in times.items()}}
+    return {
+        "times": {key: summary(t) for key, t in times.items()},
+        "processes": processes_at_once(sorted(os.sched_getaffinity(0)), 4 * settings.rounds),
+    }
 
 
 def latency(settings: Settings) -> dict[str, Any]:

@@ -40,7 +40,8 @@ def report() -> dict[str, Any]:
                 "verified/2": summary(6.0),
                 "paper128/1": summary(80.0),
                 "paper128/2": summary(50.0),
-            }
+            },
+            "processes": {"alone": [10.0, 12.0], "together": [12.5, 15.0]},
         },
         "latency": {
             "row": "P1/noise_0.01",

@@ -104,3 +104,9 @@ def test_the_page_tells_what_batches_cost(report: dict[str, Any], tmp_path: Path
     assert "| 2 | 1,600 | 150 | 13.3 |" in page
     assert "Gain of the second worker: 1.88×" in page and "a row 166 bytes" in page
     assert verdict(report, "two worker processes")["met"]
+
+
+def test_the_page_tells_what_processes_gain(report: dict[str, Any]) -> None:
+    page = markdown(report, {})
+    assert "2 processes of one thread" in page
+    assert "got through 1.60 times the calls of one" in page

@@ -40,6 +40,14 @@ def test_time_against_points_has_every_mode_and_size() -> None:
         assert times["median"] > 0.3 * stages["total"]
 
 
+def test_threads_are_measured_beside_processes() -> None:
+    found = engine_times.time_against_threads(TINY)
+    assert set(found["times"]) == {f"{mode}/1" for mode in (*engine_times.MODES, "paper128")}
+    alone, together = found["processes"]["alone"], found["processes"]["together"]
+    assert len(alone) == len(together) == max(TINY.threads)
+    assert min(alone + together) > 0
+
+
 def test_time_grows_with_the_channels() -> None:
     found = engine_times.time_against_channels(replace(TINY, channels=(8, 64)))
     assert found["encode"]["64"] > 3 * found["encode"]["8"]
