@@ -53,5 +53,5 @@ done
 echo "each target's own code: lines, missed, covered"
 for target in "${targets[@]}"; do
   own_files "$target" | tr ' ' '\n' | report "$target.profdata" "fuzz_$target" |
-    awk -v target="$target" '/^total/ || NR == 1 {line = $2 " " $3 " " $4} END {print target, line}'
+    awk -v target="$target" '/^total/ {print target, $2, $3, $4}'
 done | column -t

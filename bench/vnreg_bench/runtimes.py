@@ -139,7 +139,7 @@ def _torch_runner(task: Task, prepare: Callable[[Any], Any]) -> Runner:
 
 
 def onnx_runtime(task: Task) -> Runner:
-    import onnxruntime  # type: ignore[import-untyped]
+    import onnxruntime  # type: ignore[import-untyped]  # it has no types
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = task.threads
@@ -165,7 +165,7 @@ def openvino_bf16(task: Task) -> Runner:
 
 
 def _openvino_runner(task: Task, precision: str) -> Runner:
-    import openvino as ov  # type: ignore[import-untyped]
+    import openvino as ov  # type: ignore[import-untyped]  # it has no types
 
     core = ov.Core()
     compiled = core.compile_model(

@@ -179,7 +179,7 @@ TEST_CASE("the judged points have descriptors of their own, and the pair's noise
     const detail::JudgedCloud& c = w.verified.judge.cloud[side];
     const detail::CloudDescriptors& d = w.descriptors.features[side].out;
     REQUIRE(c.points.count == described_points_in_place(w, side));
-    REQUIRE(c.points.count > detail::most_judged_points / 2);
+    REQUIRE(c.points.count > detail::most_judged_points * 9 / 10);
     const auto unit = static_cast<float>(w.verified.radius);
     for (std::size_t i = 0; i < static_cast<std::size_t>(c.points.count); ++i) {
       const auto e = static_cast<detail::Index>(c.encoded[i]);

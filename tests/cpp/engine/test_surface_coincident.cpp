@@ -11,7 +11,7 @@ namespace {
 TEST_CASE("a surface whose points coincide is refused, wherever they are") {
   Random random(217);
   const Points body = shape(200, random);
-  for (int i = 0; i < 10; ++i) {
+  for (int i = 0; i < 30; ++i) {
     Points heap(12000, {random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(-2, 2)});
     heap.push_back(body[static_cast<std::size_t>(i)]);
     CAPTURE(i);

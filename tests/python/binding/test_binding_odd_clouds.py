@@ -251,7 +251,7 @@ def test_identical_clouds(registrar: vnreg.Registrar) -> None:
 def test_a_mirrored_object_is_not_answered_with_a_reflection(mode: str) -> None:
     models = os.path.join(os.path.dirname(__file__), "..", "..", "..", "models")
     model = vnreg.Model.load(os.path.join(models, "small.vnr")) if mode == "paper" else None
-    registrar = vnreg.Registrar(model, mode=mode)  # type: ignore[arg-type]
+    registrar = vnreg.Registrar(model, mode=mode)  # type: ignore[arg-type]  # a str, not a Literal
     rng = np.random.default_rng(7)
     for _ in range(20):
         source = body(rng, 200)

@@ -102,6 +102,7 @@ def text(delimiter: str, header: str = "") -> Callable[[Path, Points], None]:
 def npy(dtype: str, order: str = "C") -> Callable[[Path, Points], None]:
     def write(path: Path, points: Points) -> None:
         with path.open("wb") as file:  # np.save would add .npy to a bare name
+            # NumPy wants a literal for the order.
             np.save(file, np.asarray(points, dtype=dtype, order=order))  # type: ignore[call-overload]
 
     return write

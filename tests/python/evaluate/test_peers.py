@@ -44,7 +44,7 @@ def test_the_chosen_settings_are_the_best_of_the_grid() -> None:
 def test_tuning_prefers_recall_then_time(
     data_folder: Path, known_method: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    class Peer(known_method):  # type: ignore[misc]
+    class Peer(known_method):  # type: ignore[misc]  # a base chosen at run time
         def __init__(self, name: str, settings: dict[str, Any]) -> None:
             right = {"ICP": 1, "PLANE_ICP": 4, "GICP": 4}[settings["kind"]]
             super().__init__({index: 0.0 for index in range(right)})

@@ -7,6 +7,7 @@ import math
 import os
 import random
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -139,7 +140,7 @@ def test_a_longer_file_is_refused(size: int) -> None:
     ],
     ids=["crlf-to-lf", "lf-to-crlf", "cr-to-lf", "seven-bits"],
 )
-def test_a_transfer_as_text_is_refused_and_named(transfer) -> None:  # type: ignore[no-untyped-def]
+def test_a_transfer_as_text_is_refused_and_named(transfer: Callable[[bytes], bytes]) -> None:
     assert "transfer as text" in refusal(transfer(small_draft().build()), "magic").got
 
 

@@ -130,7 +130,7 @@ def test_an_empty_file_has_a_header_only() -> None:
 def test_numpy_scalars_are_written_as_their_values() -> None:
     metadata = {"i": np.int32(7), "f": np.float32(0.25), "b": np.bool_(True), "s": np.str_("x")}
     expected: dict[str, MetadataValue] = {"i": 7, "f": 0.25, "b": True, "s": "x"}
-    content = encode_model(metadata, {})  # type: ignore[arg-type]
+    content = encode_model(metadata, {})  # type: ignore[arg-type]  # metadata of any kind
     assert content == encode_model(expected, {})
 
 

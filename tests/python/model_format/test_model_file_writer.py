@@ -80,7 +80,7 @@ def test_a_weight_that_is_not_finite_is_not_written(value: float, dtype: str) ->
 
 def test_a_list_is_not_a_tensor() -> None:
     with pytest.raises(ModelFileError, match="a numpy array"):
-        encode_model({}, {"t": [1.0]})  # type: ignore[dict-item]
+        encode_model({}, {"t": [1.0]})  # type: ignore[dict-item]  # refused is what is tested
 
 
 def test_too_much_metadata_is_not_written() -> None:

@@ -324,6 +324,7 @@ def test_hyper_parameters_that_do_not_match_the_shapes(name: str) -> None:
     for key, value in metadata.items():
         if key.startswith(("channels.", "blocks.")):
             step = 4 if key == "channels.local" else 1
+            # Of these names the values are whole numbers.
             changed = value - step if key == "channels.product" else value + step  # type: ignore[operator]
             check_model_refused(metadata | {key: changed}, tensors, "tensor")
         elif isinstance(value, bool):

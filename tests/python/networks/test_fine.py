@@ -145,6 +145,7 @@ def test_the_loss_reaches_every_parameter() -> None:
     fx, fy = torch.randn(2, 20, 8), torch.randn(2, 20, 8)
     steps = fine.run(torch.randn(2, 20, 3), torch.randn(2, 20, 3), fx, fy)
     scores = (fine.significance(f).squeeze(-1) for f in (fx, fy))
+    # To mypy a sum may be the int that it starts from.
     sum(fine_loss(steps, *scores, torch.ones(2, 20)).values()).backward()  # type: ignore[union-attr]
     for name, parameter in fine.named_parameters():
         assert parameter.grad is not None and float(parameter.grad.abs().sum()) > 0, name

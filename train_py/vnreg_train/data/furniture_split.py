@@ -68,7 +68,7 @@ def _row(path: Path, line: dict[str, str]) -> SplitRow:
         raise SplitError(f"{path}: {line['model']}: unknown split {line['split']!r}")
     try:
         values: dict[str, str | int] = {**line, "group": int(line["group"])}
-        return SplitRow(**values)  # type: ignore[arg-type]
+        return SplitRow(**values)  # type: ignore[arg-type]  # only the group is a number
     except (TypeError, ValueError) as error:
         raise SplitError(f"{path}: {line.get('model')}: {error}") from error
 

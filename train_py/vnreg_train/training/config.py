@@ -100,7 +100,7 @@ T = TypeVar("T")
 
 def checked_section(kind: type[T], name: str, values: dict[str, Any]) -> T:
     """The dataclass `kind` of a TOML table; unknown keys are an error that names the known ones."""
-    known = {f.name for f in fields(kind)}  # type: ignore[arg-type]
+    known = {f.name for f in fields(kind)}  # type: ignore[arg-type]  # T is a dataclass
     unknown = sorted(set(values) - known)
     if unknown:
         raise ValueError(f"[{name}]: unknown keys {unknown}; known: {sorted(known)}")

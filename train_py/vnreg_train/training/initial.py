@@ -34,6 +34,7 @@ def scale_initial_weights(extractor: FeatureExtractor, edges: Tensor) -> None:
     hooks = []
     for module in extractor.modules():
         if isinstance(module, GlobalModule):
+            # Both are built as layers with weights, which torch types more widely.
             weight: Tensor = module.pre.linear.weight  # type: ignore[union-attr,assignment]
             weight.div_(input_size.repeat(weight.shape[1] // 3))
         if isinstance(module, VNResNetBlock):
