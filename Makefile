@@ -187,6 +187,9 @@ train-paper: data ## train models/small.vnr's network, the paper's, from the sta
 # docs/paper.md, part by part; each resumes, and can be called alone. PAPER_BUDGET=smoke makes all of it
 # in minutes, of a network that has learned nothing, into runs/paper-smoke.
 PAPER_BUDGET ?= full
+ifeq ($(filter full smoke,$(PAPER_BUDGET)),)
+$(error PAPER_BUDGET is full or smoke, not $(PAPER_BUDGET))
+endif
 ifeq ($(PAPER_BUDGET),smoke)
 PAPER := runs/paper-smoke
 PAPER_TRAIN := smoke --run $(PAPER)/network
