@@ -68,3 +68,10 @@ def test_the_small_budget_times_what_the_page_asks_for() -> None:
     lines = parser().parse_args(call).lines
     titles = {RECIPES[number - 1].title for number in lines}
     assert {SPEED, SPEED.removesuffix(", bf16")} <= titles
+
+
+def test_an_unknown_budget_is_refused() -> None:
+    run = subprocess.run(
+        ["make", "-n", "paper", "PAPER_BUDGET=typo"], cwd=ROOT, capture_output=True, text=True
+    )
+    assert run.returncode != 0 and "PAPER_BUDGET is full or smoke, not typo" in run.stderr
