@@ -43,6 +43,7 @@ def scores(rotation: list[float], **columns: object) -> Scores:
         "right_alternative": np.zeros(count, bool),
         "nees": np.full(count, np.nan),
         "twin": np.zeros(count, bool),
+        "against": np.full(count, np.nan),
     }
     return Scores(**{**fields, **{k: np.array(v) for k, v in columns.items()}})
 
@@ -125,11 +126,12 @@ def test_each_failure_counts_once_where_it_fits_first() -> None:
             ambiguous=[1, 1, 1, 1, 0, 1, 0],
             right_alternative=[1, 0, 1, 1, 1, 0, 0],
             twin=np.array([0, 0, 0, 1, 0, 0, 1], bool),
+            against=[np.nan, np.nan, 2.9, -4.0, 3.1, 900.0, 0.0],
         )
     )
-    twins = found.pop("twins")
+    twins, untold = found.pop("twins"), found.pop("untold")
     assert found == {"no_pose": 1, "near": 1, "alternative": 2, "ambiguous": 1, "wrong": 1}
-    assert twins == 2
+    assert (twins, untold) == (2, 3)
 
 
 def test_confidence_of_a_row_leaves_out_pairs_without_one() -> None:

@@ -15,6 +15,7 @@ from vnreg_train.evaluate.estimates import Estimate
 from vnreg_train.evaluate.pairs import row_pairs
 from vnreg_train.evaluate.rows import ROWS
 from vnreg_train.evaluate.scores import Scores, concatenated, score, squared_error
+from vnreg_train.evaluate.surface_evidence import TOLD
 from vnreg_train.evaluate.symmetry import TRIVIAL, Axis, make_group
 
 ROW = ROWS["P1/partial_75"]
@@ -92,8 +93,14 @@ def test_twins_are_wrong_poses_that_look_right(shapes: ShapeSet, known_method: A
     pairs = list(row_pairs(shapes, ROW, [0, 1, 2]))
     method = known_method({0: 0.0, 1: 6.0, 2: 90.0})
     estimates = [method.estimate(pair) for pair in pairs]
-    np.testing.assert_array_equal(score(pairs, estimates, {}, shapes).twin, [0, 1, 0])
-    np.testing.assert_array_equal(score(pairs, estimates, {}).twin, [0, 0, 0])
+    found = score(pairs, estimates, {}, shapes)
+    np.testing.assert_array_equal(found.twin, [0, 1, 0])
+    # 6 degrees settle; 90 are told. A right pose is not asked about.
+    np.testing.assert_array_equal(found.against < TOLD, [0, 1, 0])
+    np.testing.assert_array_equal(np.isnan(found.against), [1, 0, 0])
+    unasked = score(pairs, estimates, {})
+    np.testing.assert_array_equal(unasked.twin, [0, 0, 0])
+    assert np.isnan(unasked.against).all()
 
 
 def test_pairs_without_a_pose_are_misses(shapes: ShapeSet) -> None:

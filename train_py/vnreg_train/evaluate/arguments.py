@@ -57,8 +57,8 @@ REPORT = Lesson(
     writes="OUT, a page; beside it a folder of its name with results.json (every figure) and plots "
     "as SVG: recall against angle, overlap and noise, reliability, failures by category. The same "
     "answers give the same bytes.",
-    takes="Half a minute of one core for all rows: the pairs are made again to tell the twins "
-    "among the failures. From a results.json 5 seconds.",
+    takes="Two minutes of one core for all rows: the pairs are made again to tell the twins "
+    "among the failures, and what the surface says of each. From a results.json 5 seconds.",
     example="report --run runs/evaluate --out docs/results.md",
 )
 

@@ -11,6 +11,7 @@ import numpy as np
 from vnreg_train.data.mesh import Float64
 from vnreg_train.evaluate.confidence import auroc, reliability
 from vnreg_train.evaluate.scores import GROSS_DEG, LIMITS, Bools, Scores
+from vnreg_train.evaluate.surface_evidence import TOLD
 
 OVERLAP_EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 ANGLE_EDGES = (0.0, 45.0, 90.0, 135.0, 180.0)
@@ -114,7 +115,8 @@ def failures(scores: Scores) -> dict[str, int]:
     Each pair counts where it fits first. no_pose. near: within NEAR_DEG of a right pose, so the
     refinement lost it. alternative: a right pose was found, refined and listed, but not chosen.
     ambiguous: none was listed, but the method says that several poses fit. wrong: neither. And
-    twins: how many of them all place the shape nearly as a right pose does.
+    twins: how many of them all place the shape nearly as a right pose does. untold: of how many
+    not even the exact surface says clearly that they are wrong.
     """
     left = ~scores.symmetric()
     counts = {}
@@ -127,7 +129,9 @@ def failures(scores: Scores) -> dict[str, int]:
     ):
         counts[name] = int((left & which).sum())
         left = left & ~which
-    counts["twins"] = int((scores.twin & ~scores.symmetric()).sum())
+    wrong = ~scores.symmetric()
+    counts["twins"] = int((scores.twin & wrong).sum())
+    counts["untold"] = int(((scores.against < TOLD) & wrong).sum())
     return counts
 
 

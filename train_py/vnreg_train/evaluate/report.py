@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ from vnreg_train.evaluate.pairs import MAX_VIEW_ANGLE_DEG
 from vnreg_train.evaluate.peers import PEERS
 from vnreg_train.evaluate.rows import PAPER_SETTINGS
 from vnreg_train.evaluate.scores import GROSS_DEG, LIMITS
+from vnreg_train.evaluate.surface_evidence import TOLD
 from vnreg_train.evaluate.titles import TITLES
 from vnreg_train.evaluate.twins import NEAR
 from vnreg_train.evaluate.twins import SHARE as TWIN_SHARE
@@ -267,7 +269,7 @@ def confidence_section(results: Results) -> str:
 
 
 def failures_table(results: Results) -> str:
-    keys = ("near", "alternative", "ambiguous", "wrong", "no_pose", "twins")
+    keys = ("near", "alternative", "ambiguous", "wrong", "no_pose", "twins", "untold")
     lines = []
     for row, of in results["rows"].items():
         if METHOD in of:
@@ -275,7 +277,7 @@ def failures_table(results: Results) -> str:
             lines.append(
                 [
                     _short(row),
-                    str(sum(lost[key] for key in keys[:-1])),
+                    str(sum(lost[key] for key in keys[:5])),
                     *(str(lost[key]) for key in keys),
                 ]
             )
@@ -285,10 +287,12 @@ def failures_table(results: Results) -> str:
         "alternatives (found, not chosen); called ambiguous without it; wrong and not said so (no "
         "right pose was found, or it was rejected early); no pose. *Twins* among all of these: "
         f"wrong poses that lay {TWIN_SHARE:.0%} of the shape's surface within {NEAR:g} of where "
-        "the right one does, so that only details tell them apart."
+        "the right one does, so that only details tell them apart. *Untold* among all of these: "
+        "truly ambiguous pairs. One who knew the shape's exact surface, and let both poses settle "
+        f"on it, would not put {math.exp(TOLD):.0f} to 1 on the right one by the target's points."
     )
     head = ["row", "failures", f"within {NEAR_DEG:g}°", "among alternatives", "ambiguous"]
-    return note + "\n\n" + table([*head, "wrong", "no pose", "twins"], lines)
+    return note + "\n\n" + table([*head, "wrong", "no pose", "twins", "untold"], lines)
 
 
 def categories_section(results: Results) -> str:

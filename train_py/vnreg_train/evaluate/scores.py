@@ -13,6 +13,7 @@ from vnreg_train.data.mesh import Float64, Int64
 from vnreg_train.data.protocol import Pair, rotation_error_deg, translation_error
 from vnreg_train.data.shapes import ShapeSet
 from vnreg_train.evaluate.estimates import Estimate
+from vnreg_train.evaluate.surface_evidence import Surface, evidence
 from vnreg_train.evaluate.symmetry import TRIVIAL, SymmetryGroup
 from vnreg_train.evaluate.twins import is_twin
 
@@ -39,6 +40,9 @@ class Scores:
     right_alternative: Bools  # an alternative is right (first limit, up to symmetry)
     nees: Float64  # NaN without a covariance; of poses that are right up to symmetry
     twin: Bools  # a wrong pose that places the shape nearly alike (twins.py), where asked for
+    # How clearly the exact surface speaks against a wrong pose, nats (surface_evidence.py); NaN of
+    # right ones, and where not asked for.
+    against: Float64
 
     def __len__(self) -> int:
         return len(self.ms)
@@ -76,7 +80,8 @@ def score(
 ) -> Scores:
     """Of pairs and a method's answers to them, in the same order; at least one.
 
-    shapes: the split's, to tell the twins among the wrong poses (30 ms each).
+    shapes: the split's, to tell the twins among the wrong poses and what the surface says of them
+    (0.2 s each).
     """
     rows = [
         _one(pair, estimate, groups.get(pair.name, TRIVIAL), shapes)
@@ -91,14 +96,16 @@ def _one(
     """The fields of Scores, in their order."""
     pose, truth = estimate.T_target_source, pair.T_target_source
     plain = symmetric = (180.0, np.inf)
-    nees, twin = np.nan, False
+    nees, twin, against = np.nan, False, np.nan
     if pose is not None:
         plain = (float(rotation_error_deg(pose, truth)), float(translation_error(pose, truth)))
         symmetric = group.errors(pose, truth)
         if estimate.covariance is not None and _right(symmetric):
             nees = squared_error(pose, group.nearest(pose, truth), estimate.covariance)
         if shapes is not None and not _right(symmetric):
-            twin = is_twin(shapes.surface[pair.shape], pose, truth)
+            surface = shapes.surface[pair.shape]
+            twin = is_twin(surface, pose, truth)
+            against = evidence(Surface(surface), pair.target, truth, pose)
     return (
         *plain,
         *symmetric,
@@ -112,6 +119,7 @@ def _one(
         any(_right(group.errors(other, truth)) for other in estimate.alternatives),
         nees,
         twin,
+        against,
     )
 
 
