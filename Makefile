@@ -119,7 +119,7 @@ tsan: debian-packages ## the C++ tests under the thread sanitizer
 	$(call install_debian,$(FUZZ_DEBIAN))
 	cmake --preset tsan > /dev/null
 	cmake --build --preset tsan
-	ctest --preset tsan
+	ctest --preset tsan -j2
 
 coverage: debian-packages ## the lines of engine, kernels and model format that the C++ tests cover
 	$(call install_debian,$(FUZZ_DEBIAN))
