@@ -127,10 +127,11 @@ coverage: debian-packages ## the lines of engine, kernels and model format that 
 	cmake --build --preset coverage
 	tests/coverage.sh build/coverage
 
+# Nothing is built for it, precompiled headers neither.
 tidy: debian-packages ## clang-tidy over the C++ code
 	$(call install_debian,clang-tidy-14 $(FUZZ_DEBIAN))
-	cmake --preset fuzz > /dev/null
-	run-clang-tidy-14 -clang-tidy-binary clang-tidy-14 -quiet -p build/fuzz \
+	cmake --preset fuzz -B build/tidy -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON > /dev/null
+	run-clang-tidy-14 -clang-tidy-binary clang-tidy-14 -quiet -p build/tidy \
 	  '^$(CURDIR)/(model_format|kernels|engine|cli|viewer|fuzz)/.*\.cpp$$'
 
 analyse: debian-packages ## static analysis of the C++ code by cppcheck
