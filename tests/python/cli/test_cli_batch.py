@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import resource
@@ -10,6 +11,7 @@ import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TextIO
 
 import jsonschema
 import numpy as np
@@ -341,10 +343,24 @@ def wait_for(condition: Callable[[], object]) -> None:
         time.sleep(0.005)
 
 
-def fill(pipe: Path, cloud: Path) -> None:
-    rows = "".join(f"{x} {y} {z}\n" for x, y, z in np.load(cloud))
-    with pipe.open("w") as file:
-        file.write(rows)
+def opened(pipe: Path) -> TextIO:
+    """The end to write to, once the run has opened the other one; to wait in open() would have no
+    end where the run has gone."""
+    end = time.monotonic() + 60
+    while True:
+        try:
+            writing = os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError as error:
+            if error.errno != errno.ENXIO or time.monotonic() > end:
+                raise
+            time.sleep(0.005)
+        else:
+            os.set_blocking(writing, True)
+            return os.fdopen(writing, "w")
+
+
+def rows_of(cloud: Path) -> str:
+    return "".join(f"{x} {y} {z}\n" for x, y, z in np.load(cloud))
 
 
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
@@ -353,9 +369,10 @@ def test_an_interrupted_run_ends_in_good_order(
 ) -> None:
     output = tmp_path / "results.csv"
     process = start_slow(program_path, pairs, output)
-    process.send_signal(kind)
-    time.sleep(0.1)
-    fill(pairs.parent / "pipe.xyz", pairs.parent / "cloud_000.npy")
+    with opened(pairs.parent / "pipe.xyz") as pipe_end:
+        process.send_signal(kind)
+        time.sleep(0.1)
+        pipe_end.write(rows_of(pairs.parent / "cloud_000.npy"))
     stdout, stderr = process.communicate(timeout=60)
     message = Run(process.returncode, stdout, stderr).error(INTERRUPTED)
     assert message.startswith("interrupted: 2 of 60 pairs are in ")
@@ -378,7 +395,8 @@ def test_two_runs_do_not_write_one_file(
                 f"{output}: expected to write it alone, found another run that writes it"
             )
         assert len(output.read_text().splitlines()) == 2
-        fill(pairs.parent / "pipe.xyz", pairs.parent / "cloud_000.npy")
+        with opened(pairs.parent / "pipe.xyz") as pipe_end:
+            pipe_end.write(rows_of(pairs.parent / "cloud_000.npy"))
         process.communicate(timeout=60)
         assert process.returncode == OK
         assert len(read_rows(output)) == 60
