@@ -148,10 +148,10 @@ std::vector<std::pair<const Tensor*, const Stage*>> pair_up(const ModelFile& gol
     const auto found = golden.tensors().find(std::string(prefix) + stage.name);
     if (found != golden.tensors().end()) pairs.emplace_back(&found->second, &stage);
   }
-  for (const auto& [name, tensor] : golden.tensors()) {
-    const auto is_this = [&](const auto& pair) { return pair.first == &tensor; };
-    if (name.starts_with(prefix) && std::ranges::none_of(pairs, is_this)) {
-      pairs.emplace_back(&tensor, nullptr);
+  for (const auto& named : golden.tensors()) {
+    const auto is_this = [&](const auto& pair) { return pair.first == &named.second; };
+    if (named.first.starts_with(prefix) && std::ranges::none_of(pairs, is_this)) {
+      pairs.emplace_back(&named.second, nullptr);
     }
   }
   return pairs;
