@@ -250,6 +250,7 @@ $(VENV)/.peers: requirements/evaluate.txt $(VENV)/.installed
 evaluate: python data $(VENV)/.peers ## all modes and peers on the test split, into docs/results.md; resumes
 	$(PY) -m vnreg_train.cli evaluate --methods modes peers --run runs/evaluate --jobs 2
 	$(PY) -m vnreg_train.cli report --run runs/evaluate
+	$(PY) -m vnreg_train.cli paper-page --out docs/paper
 	$(PY) docs/page_tables.py
 
 gallery: python data ## the worst pairs of the last `make evaluate` in one page with the viewer, runs/gallery.html

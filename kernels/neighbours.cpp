@@ -129,6 +129,7 @@ float next_above(const float* squared, Index count, float limit) noexcept {
   std::int32_t next = bits_of(infinity);
 #pragma omp simd reduction(min : next)
   for (Index i = 0; i < count; ++i) {
+    // NOLINTNEXTLINE(bugprone-narrowing-conversions): from float to float, it says itself.
     const std::int32_t candidate = bits_of(squared[i] > limit ? squared[i] : infinity);
     next = candidate < next ? candidate : next;
   }
@@ -241,6 +242,7 @@ float nearest_other(std::int32_t own, const Candidates& c) noexcept {
   std::int32_t nearest = bits_of(infinity);
 #pragma omp simd reduction(min : nearest)
   for (Index i = 0; i < c.count; ++i) {
+    // NOLINTNEXTLINE(bugprone-narrowing-conversions): from float to float, it says itself.
     const std::int32_t candidate = bits_of(original[i] == own ? infinity : squared[i]);
     nearest = candidate < nearest ? candidate : nearest;
   }
