@@ -118,7 +118,7 @@ def failures(scores: Scores) -> dict[str, int]:
     twins: how many of them all place the shape nearly as a right pose does. untold: of how many
     not even the exact surface says clearly that they are wrong.
     """
-    left = ~scores.symmetric()
+    left = wrong = ~scores.symmetric()
     counts = {}
     for name, which in (
         ("no_pose", ~np.isfinite(scores.translation)),
@@ -129,7 +129,6 @@ def failures(scores: Scores) -> dict[str, int]:
     ):
         counts[name] = int((left & which).sum())
         left = left & ~which
-    wrong = ~scores.symmetric()
     counts["twins"] = int((scores.twin & wrong).sum())
     counts["untold"] = int(((scores.against < TOLD) & wrong).sum())
     return counts

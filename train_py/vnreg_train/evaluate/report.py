@@ -269,7 +269,7 @@ def confidence_section(results: Results) -> str:
 
 
 def failures_table(results: Results) -> str:
-    keys = ("near", "alternative", "ambiguous", "wrong", "no_pose", "twins", "untold")
+    kinds = ("near", "alternative", "ambiguous", "wrong", "no_pose")
     lines = []
     for row, of in results["rows"].items():
         if METHOD in of:
@@ -277,8 +277,8 @@ def failures_table(results: Results) -> str:
             lines.append(
                 [
                     _short(row),
-                    str(sum(lost[key] for key in keys[:5])),
-                    *(str(lost[key]) for key in keys),
+                    str(sum(lost[key] for key in kinds)),
+                    *(str(lost[key]) for key in (*kinds, "twins", "untold")),
                 ]
             )
     note = (
