@@ -145,14 +145,13 @@ void own_products(const Tile& t, const kernels::PackedMatrix& weights, const flo
 void put_scalars(const Tile& t, const float* scalars, Index offset, Index stride) noexcept {
   const Index rows = t.scalar_rows();
   for (Index p = 0; p < t.width; ++p) {
-    std::copy_n(scalars + p * rows, rows, t.s.mlp_input.data() + p * stride + offset);
+    kernels::copy_packets(scalars + p * rows, rows, t.s.mlp_input.data() + p * stride + offset);
   }
 }
 
-/// What the points of the tile tell their neighbours.
+/// What the points of the tile tell their neighbours; n(v) is in the scratch.
 void write_messages(const Tile& t, const CollectLayer& layer, kernels::Floats& messages) noexcept {
   const Index k = layer.gate_rows(), c = t.vector_rows(), h = t.scalar_rows();
-  kernels::normalize_vectors(t.v(), c, t.model.arch.vectors, t.width, t.s.normalized.data());
   kernels::linear(layer.gate, t.z(), h, t.width, t.s.gate.data());
   const CloudDescriptors& out = t.f.out;
   for (Index p = 0; p < t.width; ++p) {
@@ -162,10 +161,11 @@ void write_messages(const Tile& t, const CollectLayer& layer, kernels::Floats& m
     const float* gate = t.s.gate.data() + k * p;
     for (Index axis = 0; axis < 3; ++axis) {
       for (Index i = 0; i < k; ++i) message[axis * k + i] = place[axis] * gate[i];
-      std::copy_n(t.s.normalized.data() + (axis * t.width + p) * c, c, message + 4 * k + axis * c);
+      kernels::copy_packets(t.s.normalized.data() + (axis * t.width + p) * c, c,
+                            message + 4 * k + axis * c);
     }
-    std::copy_n(gate, k, message + 3 * k);
-    std::copy_n(t.z() + p * h, h, message + 4 * k + 3 * c);
+    kernels::copy_packets(gate, k, message + 3 * k);
+    kernels::copy_packets(t.z() + p * h, h, message + 4 * k + 3 * c);
   }
 }
 
@@ -189,9 +189,9 @@ void collect(const Tile& t, const CollectLayer& layer, const kernels::Floats& me
       for (Index i = 0; i < k; ++i) {
         column[i] = (sum[axis * k + i] - place[axis] * gate[i]) * inverse;
       }
-      std::copy_n(sum + 4 * k + axis * c, c, column + k);
+      kernels::copy_packets(sum + 4 * k + axis * c, c, column + k);
     }
-    std::copy_n(sum + 4 * k + 3 * c, h, near + p * h);
+    kernels::copy_packets(sum + 4 * k + 3 * c, h, near + p * h);
   }
   kernels::multiply_add(layer.collect, t.s.collected.data(), k + c, 3 * t.width, t.v(), c);
 }
@@ -279,6 +279,7 @@ void run_local_stage(const Tile& t) noexcept {
   constexpr Index context_rows = padded(kernels::context_vectors);
   kernels::multiply_add(m.context_vectors, t.vectors(t.f.context_inputs, context_rows),
                         context_rows, 3 * t.width, t.v(), c);
+  kernels::normalize_vectors(t.v(), c, m.arch.vectors, t.width, n);
   write_messages(t, m.context_collect, t.f.messages[1]);
 }
 
