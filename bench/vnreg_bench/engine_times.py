@@ -23,6 +23,7 @@ from vnreg_bench.timing import (
     summary,
     tail,
 )
+from vnreg_bench.waiting import cost_of_waiting
 from vnreg_train.evaluate.methods import Mode
 from vnreg_train.evaluate.pairs import make_pairs
 from vnreg_train.model_file import read_model
@@ -89,7 +90,8 @@ def time_against_channels(settings: Settings) -> dict[str, Any]:
 
 def time_against_threads(settings: Settings) -> dict[str, Any]:
     """Milliseconds by mode and threads, 1,024 points; `paper128` is the paper's own width. And what
-    as many processes gain, which share nothing but the machine."""
+    as many processes gain, which share nothing but the machine; and what the ways cost in which
+    threads may wait."""
     pin(max(settings.threads))
     pair, work = bent_box(1024), {}
     with tempfile.TemporaryDirectory() as folder:
@@ -105,6 +107,7 @@ def time_against_threads(settings: Settings) -> dict[str, Any]:
     return {
         "times": {key: summary(t) for key, t in times.items()},
         "processes": processes_at_once(sorted(os.sched_getaffinity(0)), 4 * settings.rounds),
+        "waiting": cost_of_waiting(pair, settings.threads, 10 * settings.rounds),
     }
 
 

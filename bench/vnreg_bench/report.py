@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from vnreg_bench.bars import fastest_global_peer, verdicts
@@ -12,6 +12,7 @@ from vnreg_train.evaluate.report import table
 from vnreg_train.evaluate.titles import TITLES
 
 Report = Mapping[str, Any]
+WAITING = {"default": "spin, then sleep", "passive": "sleep"}
 # What a part's medians are over, where it is not rounds: the name of the setting.
 RUNS = {
     "kernels": "kernel_repetitions",
@@ -147,9 +148,29 @@ def threads_section(report: Report) -> list[str]:
         table(head, lines),
         f"Right after that, {len(processes['together'])} processes of one thread (mode verified), "
         "which share nothing but the machine, got through "
-        f"{gain(processes):.2f} times the calls of one at the same time. What threads gain less "
-        "than that seems to hang on how fast one processor sees what another one has written, "
-        "which on a virtual machine changes from minute to minute.",
+        f"{gain(processes):.2f} times the calls of one at the same time.",
+        *waiting_table(report["threads"]["waiting"]),
+    ]
+
+
+def waiting_table(found: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Quantiles by policy, number of busy programs and number of threads."""
+    lines = [
+        (
+            WAITING[of["policy"]],
+            str(of["busy"]),
+            str(of["threads"]),
+            *(_figure(of["tail"][q]) for q in ("p50", "p95", "p99")),
+        )
+        for of in found
+    ]
+    return [
+        "Threads that wait for each other spin for a while before they sleep, unless the program "
+        "was started with `OMP_WAIT_POLICY=passive` in its environment. That is what is fastest on "
+        "processors that the program has for itself, and slow where others use them, too: the one "
+        "that spins keeps the processor from the one that is waited for. Mode verified, ordinary "
+        "priority, milliseconds:",
+        table(("OpenMP's threads", "busy programs beside", "threads", "p50", "p95", "p99"), lines),
     ]
 
 

@@ -42,6 +42,17 @@ def report() -> dict[str, Any]:
                 "paper128/2": summary(50.0),
             },
             "processes": {"alone": [10.0, 12.0], "together": [12.5, 15.0]},
+            "waiting": [
+                {
+                    "busy": busy,
+                    "policy": policy,
+                    "threads": threads,
+                    "tail": {"p50": 6.0, "p95": 7.0, "p99": 8.5, "p99.9": 9.0, "runs": 90},
+                }
+                for busy in (0, 1)
+                for policy in ("default", "passive")
+                for threads in (1, 2)
+            ],
         },
         "latency": {
             "row": "P1/noise_0.01",

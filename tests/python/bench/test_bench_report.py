@@ -110,3 +110,9 @@ def test_the_page_tells_what_processes_gain(report: dict[str, Any]) -> None:
     page = markdown(report, {})
     assert "2 processes of one thread" in page
     assert "got through 1.60 times the calls of one" in page
+
+
+def test_the_page_tells_what_waiting_costs(report: dict[str, Any]) -> None:
+    page = markdown(report, {})
+    assert "| spin, then sleep | 1 | 2 | 6.00 | 7.00 | 8.50 |" in page
+    assert "| sleep | 0 | 1 | 6.00 | 7.00 | 8.50 |" in page

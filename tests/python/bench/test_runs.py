@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from vnreg_bench import batch, engine_times, low_precision
+from vnreg_bench import batch, engine_times, low_precision, waiting
 from vnreg_bench.inputs import SHIPPED, bent_box, random_paper_model
 from vnreg_bench.settings import Settings
 
@@ -46,6 +47,25 @@ def test_threads_are_measured_beside_processes() -> None:
     alone, together = found["processes"]["alone"], found["processes"]["together"]
     assert len(alone) == len(together) == max(TINY.threads)
     assert min(alone + together) > 0
+    kinds = [(of["busy"], of["policy"], of["threads"]) for of in found["waiting"]]
+    assert kinds == [(b, p, 1) for b in (0, 1) for p in ("default", "passive")]
+    assert all(of["tail"]["runs"] == 10 * TINY.rounds for of in found["waiting"])
+
+
+@pytest.mark.parametrize("policy", waiting.POLICIES)
+def test_processes_started_inside_have_the_policy(
+    policy: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(waiting.VARIABLE, "active")
+    with waiting.waiting(policy), get_context("spawn").Pool(1) as process:
+        assert process.apply(os.getenv, (waiting.VARIABLE, "default")) == policy
+    assert os.environ[waiting.VARIABLE] == "active"
+
+
+def test_busy_programs_end() -> None:
+    with waiting.busy_programs(2) as programs:
+        assert all(program.poll() is None for program in programs)
+    assert all(program.poll() is not None for program in programs)
 
 
 def test_time_grows_with_the_channels() -> None:
