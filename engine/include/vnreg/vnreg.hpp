@@ -83,7 +83,9 @@ VNREG_API std::string_view to_string(Status status) noexcept;
 struct Options {
   /// How poses are looked for. Mode::paper needs a model of that architecture.
   Mode mode = Mode::verified;
-  /// OpenMP threads of one align call; 0 means what OpenMP says. With 1, no parallel region opens.
+  /// OpenMP threads of one align call; 0 means what OpenMP says. With 1, no parallel region opens:
+  /// the choice for processors that other programs use, too, unless OpenMP's threads may sleep
+  /// while they wait (OMP_WAIT_POLICY=passive in the program's environment).
   int threads = 0;
   /// Clouds with more points are subsampled to this many (64 to 16,384); 0 means what the model
   /// was trained with.
