@@ -115,11 +115,11 @@ sanitize: fuzzers ## the C++ tests under address and undefined-behaviour sanitiz
 	ctest --preset sanitize -j2
 
 # Of clang, whose OpenMP tells the sanitizer where threads meet (libarcher); GCC's does not.
-tsan: debian-packages ## the C++ tests under the thread sanitizer; SUITE=engine: only this one
+tsan: debian-packages ## the C++ tests under the thread sanitizer
 	$(call install_debian,$(FUZZ_DEBIAN))
 	cmake --preset tsan > /dev/null
-	cmake --build --preset tsan $(if $(SUITE),--target test_$(SUITE))
-	ctest --preset tsan -j2 $(if $(SUITE),-R '^$(SUITE)$$')
+	cmake --build --preset tsan
+	ctest --preset tsan -j2
 
 coverage: debian-packages ## the lines of engine, kernels and model format that the C++ tests cover
 	$(call install_debian,$(FUZZ_DEBIAN))

@@ -29,6 +29,13 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   set(VNREG_BASELINE_OPTION -march=x86-64)
 endif()
 
+# For what is compiled with a precompiled header, which ccache keeps only when told so.
+set(VNREG_PRECOMPILED_LAUNCHER ${CMAKE_CXX_COMPILER_LAUNCHER})
+if(CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
+  set(VNREG_PRECOMPILED_LAUNCHER ${CMAKE_COMMAND} -E env
+    CCACHE_SLOPPINESS=pch_defines,time_macros ${CMAKE_CXX_COMPILER_LAUNCHER})
+endif()
+
 # Headers of libraries that most files of a target include, compiled once, where sanitizers make a
 # build that shares no object with others. The others share theirs by ccache, which a header in the
 # folder of one build would prevent.
@@ -37,10 +44,8 @@ function(vnreg_precompile target)
     return()
   endif()
   target_precompile_headers(${target} PRIVATE ${ARGN})
-  if(CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")  # keeps what is compiled with one only when told so
-    set_target_properties(${target} PROPERTIES CXX_COMPILER_LAUNCHER
-      "${CMAKE_COMMAND};-E;env;CCACHE_SLOPPINESS=pch_defines,time_macros;${CMAKE_CXX_COMPILER_LAUNCHER}")
-  endif()
+  set_target_properties(${target} PROPERTIES
+    CXX_COMPILER_LAUNCHER "${VNREG_PRECOMPILED_LAUNCHER}")
 endfunction()
 
 # The public headers; split from the engine so that kernels and model_format can name vnreg::Error.

@@ -145,7 +145,7 @@ void own_products(const Tile& t, const kernels::PackedMatrix& weights, const flo
 void put_scalars(const Tile& t, const float* scalars, Index offset, Index stride) noexcept {
   const Index rows = t.scalar_rows();
   for (Index p = 0; p < t.width; ++p) {
-    kernels::copy_packets(scalars + p * rows, rows, t.s.mlp_input.data() + p * stride + offset);
+    std::copy_n(scalars + p * rows, rows, t.s.mlp_input.data() + p * stride + offset);
   }
 }
 
@@ -161,11 +161,10 @@ void write_messages(const Tile& t, const CollectLayer& layer, kernels::Floats& m
     const float* gate = t.s.gate.data() + k * p;
     for (Index axis = 0; axis < 3; ++axis) {
       for (Index i = 0; i < k; ++i) message[axis * k + i] = place[axis] * gate[i];
-      kernels::copy_packets(t.s.normalized.data() + (axis * t.width + p) * c, c,
-                            message + 4 * k + axis * c);
+      std::copy_n(t.s.normalized.data() + (axis * t.width + p) * c, c, message + 4 * k + axis * c);
     }
-    kernels::copy_packets(gate, k, message + 3 * k);
-    kernels::copy_packets(t.z() + p * h, h, message + 4 * k + 3 * c);
+    std::copy_n(gate, k, message + 3 * k);
+    std::copy_n(t.z() + p * h, h, message + 4 * k + 3 * c);
   }
 }
 
@@ -189,9 +188,9 @@ void collect(const Tile& t, const CollectLayer& layer, const kernels::Floats& me
       for (Index i = 0; i < k; ++i) {
         column[i] = (sum[axis * k + i] - place[axis] * gate[i]) * inverse;
       }
-      kernels::copy_packets(sum + 4 * k + axis * c, c, column + k);
+      std::copy_n(sum + 4 * k + axis * c, c, column + k);
     }
-    kernels::copy_packets(sum + 4 * k + 3 * c, h, near + p * h);
+    std::copy_n(sum + 4 * k + 3 * c, h, near + p * h);
   }
   kernels::multiply_add(layer.collect, t.s.collected.data(), k + c, 3 * t.width, t.v(), c);
 }

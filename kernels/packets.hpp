@@ -24,13 +24,6 @@ constexpr Index padded(Index rows) noexcept {
 /// Floats whose first element is aligned for packets.
 using Floats = std::vector<float, Eigen::aligned_allocator<float>>;
 
-/// Copies whole packets; for the few of a column, a call of memcpy takes longer than they do.
-inline void copy_packets(const float* from, Index count, float* to) noexcept {
-  for (Index i = 0; i < count; i += packet_size) {
-    Eigen::internal::pstoreu(to + i, Eigen::internal::ploadu<Packet>(from + i));
-  }
-}
-
 using RowMajorMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 }  // namespace vnreg::kernels

@@ -15,8 +15,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from vnreg_bench import waiting
-from vnreg_bench.machine import commit, describe, take_priority
+from vnreg_bench.machine import WAIT_POLICY, commit, describe, take_priority
 from vnreg_bench.settings import ROOT, Settings
 
 JSON = ROOT / "docs" / "benchmark" / "benchmark.json"
@@ -75,7 +74,7 @@ def measured_part(
     command += ["--quick"] if arguments.quick else []
     environment = os.environ | {"PYTHONWARNINGS": "ignore::FutureWarning"}  # of torch, about torch
     if name != "threads":  # which times the engine as it comes
-        environment[waiting.VARIABLE] = "passive"  # runtimes share the processors: none may spin
+        environment[WAIT_POLICY] = "passive"  # runtimes share the processors: none may spin
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "part.json"
         subprocess.run([*command, "--out", str(out)], check=True, env=environment)

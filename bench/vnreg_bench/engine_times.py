@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import tempfile
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -105,22 +104,12 @@ def time_against_threads(settings: Settings) -> dict[str, Any]:
             work[f"{label}/{threads}"] = aligner(registrar(label, 1024, threads), pair)
         paper = vnreg.Registrar(wide, mode="paper", threads=threads)
         work[f"paper128/{threads}"] = aligner(paper, pair)
-    times = interleaved({key: after_a_pause(call) for key, call in work.items()}, settings.rounds)
+    times = interleaved(work, settings.rounds, PAUSE_S)
     return {
         "times": {key: summary(t) for key, t in times.items()},
         "processes": processes_at_once(sorted(os.sched_getaffinity(0)), 4 * settings.rounds),
         "waiting": cost_of_waiting(pair, settings.threads, 10 * settings.rounds),
     }
-
-
-def after_a_pause(call: Callable[[], float]) -> Callable[[], float]:
-    """Until the threads of the call before sleep; while they spin, they slow one thread down."""
-
-    def paused() -> float:
-        time.sleep(PAUSE_S)
-        return call()
-
-    return paused
 
 
 def latency(settings: Settings) -> dict[str, Any]:

@@ -19,6 +19,7 @@ PACKAGES = (
     "kiss-matcher",
     "small_gicp",
 )
+WAIT_POLICY = "OMP_WAIT_POLICY"  # OpenMP looks at it once, when it is loaded
 EXTENSIONS = ("avx2", "fma", "avx512f", "avx512_bf16", "amx_bf16")
 
 
@@ -89,6 +90,11 @@ def take_priority() -> None:
     Raises PermissionError where the user may not.
     """
     os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+
+
+def give_up_priority(process: int = 0) -> None:
+    """Of this process, or of one that it has started: an ordinary program again."""
+    os.sched_setscheduler(process, os.SCHED_OTHER, os.sched_param(0))
 
 
 def pin(cores: int) -> None:

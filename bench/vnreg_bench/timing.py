@@ -27,14 +27,19 @@ def rest(ms: float) -> None:
         time.sleep(2e-4 * ms)
 
 
-def interleaved(work: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, Times]:
+def interleaved(
+    work: Mapping[str, Callable[[], float]], rounds: int, pause_s: float = 0
+) -> dict[str, Times]:
     """What every function returns (its milliseconds), `rounds` times: each round calls each once,
-    so that whatever else the machine does meets all alike. The first rounds are left out."""
+    so that whatever else the machine does meets all alike. The first rounds are left out. A pause
+    behind every call lets its threads sleep, which would slow the next one while they spin."""
     times: dict[str, Times] = {label: [] for label in work}
     for round_number in range(-WARM_UP, rounds):
         for label, run in work.items():
             ms = run()
             rest(ms)
+            if pause_s > 0:
+                time.sleep(pause_s)
             if round_number >= 0:
                 times[label].append(ms)
     return times

@@ -10,16 +10,15 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import get_context
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 import vnreg
+from vnreg_bench.machine import WAIT_POLICY, give_up_priority
 from vnreg_bench.timing import WARM_UP, milliseconds, tail
 
-Cloud = NDArray[np.float32]  # not that of inputs.py: every process would wait for torch
-VARIABLE = "OMP_WAIT_POLICY"  # OpenMP looks at it once, when it is loaded
+if TYPE_CHECKING:  # else every process would wait for torch
+    from vnreg_bench.inputs import Cloud
+
 POLICIES = ("default", "passive")
 BUSY = (0, 1)  # programs beside the one that is timed
 
@@ -43,7 +42,7 @@ def cost_of_waiting(
 
 def time_calls(pair: tuple[Cloud, Cloud], threads: int, calls: int) -> list[float]:
     """Runs in a process that has the policy."""
-    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    give_up_priority()
     registrar = vnreg.Registrar(mode="verified", threads=threads)
     times = [milliseconds(lambda: registrar.align(*pair)) for _ in range(WARM_UP + calls)]
     return times[WARM_UP:]
@@ -51,11 +50,11 @@ def time_calls(pair: tuple[Cloud, Cloud], threads: int, calls: int) -> list[floa
 
 @contextmanager
 def busy_programs(count: int) -> Iterator[list[subprocess.Popen[bytes]]]:
-    code = (
-        "import os\nos.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))\nwhile True: pass"
-    )
+    code = "while True: pass"
     programs = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(count)]
     try:
+        for program in programs:
+            give_up_priority(program.pid)
         yield programs
     finally:
         for program in programs:
@@ -66,12 +65,12 @@ def busy_programs(count: int) -> Iterator[list[subprocess.Popen[bytes]]]:
 @contextmanager
 def waiting(policy: str) -> Iterator[None]:
     """Processes that are started inside have the policy."""
-    before = os.environ.pop(VARIABLE, None)
+    before = os.environ.pop(WAIT_POLICY, None)
     if policy != "default":
-        os.environ[VARIABLE] = policy
+        os.environ[WAIT_POLICY] = policy
     try:
         yield
     finally:
-        os.environ.pop(VARIABLE, None)
+        os.environ.pop(WAIT_POLICY, None)
         if before is not None:
-            os.environ[VARIABLE] = before
+            os.environ[WAIT_POLICY] = before

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from vnreg_bench import batch, engine_times, low_precision, waiting
+from vnreg_bench import batch, engine_times, low_precision, machine, waiting
 from vnreg_bench.inputs import SHIPPED, bent_box, random_paper_model
 from vnreg_bench.settings import Settings
 
@@ -56,10 +56,10 @@ def test_threads_are_measured_beside_processes() -> None:
 def test_processes_started_inside_have_the_policy(
     policy: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(waiting.VARIABLE, "active")
+    monkeypatch.setenv(machine.WAIT_POLICY, "active")
     with waiting.waiting(policy), get_context("spawn").Pool(1) as process:
-        assert process.apply(os.getenv, (waiting.VARIABLE, "default")) == policy
-    assert os.environ[waiting.VARIABLE] == "active"
+        assert process.apply(os.getenv, (machine.WAIT_POLICY, "default")) == policy
+    assert os.environ[machine.WAIT_POLICY] == "active"
 
 
 def test_busy_programs_end() -> None:
